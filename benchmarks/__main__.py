@@ -28,6 +28,7 @@ SECTIONS = {
     "securing": "cargo on a ship's deck: the hand calculation of the Code beside the motion",
     "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
     "fit": "fits of synthetic measurements: how often intervals hold the truth; work beside differences",
+    "formulas": "laws by formula beside the built-in laws: values, gradients, time",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
     "optimum": "does the optimiser find the optimum, is its last word true; beside other optimisers",
     "peers": "the paper's scene and others beside other programs, which the extra peers installs",
@@ -70,6 +71,7 @@ PAGES = {
 #: the same of sections that `--pages` writes
 TOLD = {
     "fit": "docs/fitting.md",
+    "formulas": "docs/expressions.md",
     "bound": "docs/theory/bound.md",
     "priced": "docs/theory/pricing.md",
     "securing": "docs/applications/cargo.md",

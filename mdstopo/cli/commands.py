@@ -14,7 +14,7 @@ COMMANDS: dict[str, str] = {
     "plot": "Draw what a result file holds.",
     "report": "Write one HTML page that shows a result in motion.",
     "animate": "Write the motion of a result as GIF, MP4 or SVG.",
-    "watch": "Follow a run, front or sweep on a page of this computer.",
+    "watch": "Follow a run, front, sweep or fit on a page of this computer.",
     "diff": "Say what differs between two results.",
     "export": "Write a result as CSV tables or JSON.",
     "bench": "Measure scaling, work against precision, and what is left out.",

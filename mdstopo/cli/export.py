@@ -12,7 +12,7 @@ _NOT_IN_TABLES = ("optimizer", "resume", "pareto/tasks", "sweep/tasks", "combine
 
 @click.command("export")
 @result_argument
-@click.option("--csv", "kind", flag_value="csv", help="Tables: members, iterations, front, trajectories.")
+@click.option("--csv", "kind", flag_value="csv", help="Tables: members, iterations, front, fit, trajectories.")
 @click.option("--json", "kind", flag_value="json", help="One JSON document with every dataset.")
 @click.option("--gltf", "kind", flag_value="glb", help="The motion as one binary glTF file, for any viewer.")
 @click.option("--point", type=click.IntRange(0), metavar="K", help="Of a front: --gltf of the design of this point.")

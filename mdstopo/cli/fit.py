@@ -1,19 +1,37 @@
 """`mdstopo fit`: numbers of a case from measurements."""
 
 import math
+import shlex
+import sys
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from mdstopo.cli.interrupt import Interrupts
-from mdstopo.cli.options import EXIT, FILE, announce_compilation, case_argument, open_case, output_options, set_option
+from mdstopo.cli.fit_numbers import say_fit
+from mdstopo.cli.interrupt import Interrupts, saying_how_to_go_on
+from mdstopo.cli.options import (
+    EXIT,
+    FILE,
+    announce_compilation,
+    case_argument,
+    open_case,
+    out_option,
+    output_options,
+    result_path,
+    set_option,
+)
 from mdstopo.cli.output import Output, number
+from mdstopo.cli.pareto import resumed
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from mdstopo.case.model import Case
     from mdstopo.fit.problem import FitProblem
     from mdstopo.fit.run_fit import FitRun
+    from mdstopo.store.result_reader import ResultView
 
 #: a fit whose squares sum up to less or more than happens by chance once in so many times is remarked upon
 _RARE = 1e-3
@@ -29,10 +47,10 @@ _RARE = 1e-3
     metavar="K",
     help="Profiles of all estimates, with K points on each side.",
 )
-@click.option("--out", type=FILE, metavar="FILE", help="Where the result goes, JSON (default: results/CASE.fit.json).")
+@out_option
 @click.option("--plot", "picture_path", type=FILE, metavar="FILE", help="Draw fit and residuals: .png, .svg, .pdf.")
 @click.option("--resume", is_flag=True, help="Go on with a fit that was stopped.")
-@click.option("--overwrite", is_flag=True, help="Replace the result and the fitted case that are there.")
+@click.option("--overwrite", is_flag=True, help="Replace whatever the result file and the fitted case hold.")
 @set_option
 @output_options
 def command(
@@ -49,7 +67,7 @@ def command(
     """Estimate numbers of a case from what was measured, as its section `fit` says.
 
     The result tells estimates with their intervals, and what the data cannot tell apart. The case with the fitted
-    numbers is written beside it, as NAME.fitted.yaml.
+    numbers is written beside it, as NAME.fitted.yaml. `mdstopo show`, `plot`, `report` and `watch` take the result.
     \f
     Arguments, which --help leaves out:
 
@@ -69,149 +87,167 @@ def command(
 
         needed = "the key 'fit' is missing: it says what is estimated and what was measured"
         raise CaseError([case.marks.mistake("", needed)], str(case_path))
-    from mdstopo.fit.record import content, write
-    from mdstopo.store.atomic import replace_file
+    from mdstopo.fit.record import content
+    from mdstopo.store.admit import prepare_place
+    from mdstopo.store.atomic import remove_leftovers
+    from mdstopo.store.lock import Lock
+    from mdstopo.store.result_reader import read_result
 
-    path = out or Path("results") / f"{case.name}.fit.json"
-    fitted_path = path.with_name(f"{case.name}.fitted.yaml")
-    before = _places(path, fitted_path, picture_path, case, resume, overwrite)
+    line = shlex.join(["mdstopo", *sys.argv[1:]])
+    path, again = result_path(out, case, "fit"), resumed(line)
+    _check(picture_path, resume, overwrite)
     interrupts = Interrupts(quiet)
-    from mdstopo.fit.fitted_case import fitted_text
-    from mdstopo.fit.prepared import prepared
-    from mdstopo.fit.problem import FitProblem
-    from mdstopo.fit.run_fit import run_fit
-
-    announce_compilation(output, prepared(case))
-    problem = FitProblem(case)
-    known = _before(problem, before, path)
-    run = run_fit(problem, points, known, lambda each: write(each, path), interrupts.stop_requested)
-    written = None
-    if run.found is not None:
-        count = len(problem.numbers.keys)
-        numbers = dict(zip(problem.names[:count], run.found.x[:count].tolist(), strict=True))
-        replace_file(fitted_path, fitted_text(case, numbers, fitted_path).encode())
-        written = fitted_path
-        if picture_path is not None:
-            from mdstopo.plots.fit_picture import picture
-
-            picture(content(run), picture_path)
-    _say(output, run, path, written)
-    output.document({"command": "fit", **content(run), "path": str(path), "fitted_case": written and str(written)})
+    with saying_how_to_go_on(output, "fit", case.name, path, resume, again):
+        place = prepare_place(path)
+        with Lock(place):
+            remove_leftovers(place)
+            run = _fitted(case, place, _Asked(points, resume, overwrite, line), output, interrupts.stop_requested)
+    found = content(read_result(path))
+    written = path.with_name(f"{case.name}.fitted.yaml") if run.found is not None else None
+    if written is not None and picture_path is not None:
+        _draw(path, picture_path)
+    output.say(f"{case.title or case.name}: {run.status.replace('_', ' ')} - {run.reason}")
+    say_fit(output, found)
+    output.table([["result", str(path)], *([["fitted case", str(written)]] if written else [])])
+    output.document({"command": "fit", **found, "path": str(path), "fitted_case": written and str(written)})
     for remark in _remarks(run):
         output.notice(f"warning: {remark}")
     if run.status == "interrupted":
-        output.notice("interrupted; to go on, add --resume to the command")
+        output.notice(f"interrupted; to go on: {again}")
     return EXIT[run.status]
 
 
-def _places(
-    path: Path, fitted_path: Path, picture_path: Path | None, case: "Case", resume: bool, overwrite: bool
-) -> dict[str, Any] | None:
-    """What the result file holds that is gone on with, or None; refuses to replace what it was not told to.
-
-    path, fitted_path, picture_path: what is going to be written.
-    case: which is not replaced whatever is said.
-    resume, overwrite: as of the command.
-    """
-    from mdstopo.fit.record import read
+def _check(picture_path: Path | None, resume: bool, overwrite: bool) -> None:
+    """Refuse options that exclude each other, and a picture that cannot be. Raises UsageError, StoreError."""
     from mdstopo.plots.style import FORMATS
     from mdstopo.store.store_errors import StoreError
 
     if resume and overwrite:
-        raise click.UsageError("say --resume or --overwrite, not both")
+        raise click.UsageError("--resume and --overwrite exclude each other")
     if picture_path is not None and picture_path.suffix.lower() not in FORMATS:
         raise StoreError(f"{picture_path}: a picture ends in {', '.join(FORMATS)}")
-    if resume and not path.exists():
-        raise StoreError(f"{path}: there is no result to go on with")
-    for place in (path, fitted_path):
-        if case.path is not None and place.exists() and case.path.exists() and place.samefile(case.path):
-            raise StoreError(f"{place}: this is the case that is fitted; choose another place with --out")
-        if place.exists() and not (resume or (overwrite and place.is_file())):
-            raise StoreError(f"{place} exists already; it is left as it is (--overwrite, --resume)")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
-    return read(path) if resume else None
 
 
-def _before(problem: "FitProblem", before: dict[str, Any] | None, path: Path) -> "FitRun | None":
+class _Asked(NamedTuple):
+    """points: of profiles; resume, overwrite: what becomes of a result that is there; line: the command line."""
+
+    points: int
+    resume: bool
+    overwrite: bool
+    line: str
+
+
+def _fitted(
+    case: "Case",
+    place: Path,
+    asked: _Asked,
+    output: Output,
+    stop: "Callable[[], bool]",
+) -> "FitRun":
+    """The fit, which is kept at a place that is locked, and the fitted case beside it.
+
+    case: with its section `fit`.
+    place: of the result file.
+    asked: how it is to be done.
+    output: where it is said what happens.
+    stop: whether to end.
+    """
+    from mdstopo.fit.fitted_case import fitted_text
+    from mdstopo.fit.prepared import prepared
+    from mdstopo.fit.problem import FitProblem
+    from mdstopo.fit.record import FitFile
+    from mdstopo.fit.run_fit import FitRun, run_fit
+    from mdstopo.store.atomic import replace_file
+    from mdstopo.store.checkpoint import Checkpointer
+
+    before = _before(case, place, asked.resume, asked.overwrite, output.notice)
+    fitted_place = place.with_name(f"{case.name}.fitted.yaml")
+    _check_fitted(fitted_place, place, case, asked.overwrite)
+    announce_compilation(output, prepared(case))
+    problem = FitProblem(case)
+    known = None if before is None else _restored(problem, before)
+    file = FitFile(place, problem, asked.line)
+    run = FitRun(problem) if known is None else known
+    saver = Checkpointer(lambda: file.checkpoint(run, output.notice))
+
+    def save(_run: FitRun, urgent: bool = True) -> None:
+        saver.offer(urgent=urgent)
+
+    run_fit(problem, asked.points, run, save, stop, partial(save, urgent=False))
+    text = None
+    if run.found is not None:
+        count = len(problem.numbers.keys)
+        numbers = dict(zip(problem.names[:count], run.found.x[:count].tolist(), strict=True))
+        text = fitted_text(case, numbers, fitted_place)
+    file.conclude(run, text, tuple(_remarks(run)))
+    if text is not None:
+        replace_file(fitted_place, text.encode())
+    return run
+
+
+def _before(
+    case: "Case", place: Path, resume: bool, overwrite: bool, notify: "Callable[[str], None]"
+) -> "ResultView | None":
+    """The result that is gone on with, None where it begins anew; refuses to replace what should not be lost.
+
+    case: which is fitted.
+    place: of the result file.
+    resume, overwrite: as of the command.
+    notify: is given sentences for the user.
+    """
+    from mdstopo.store.admit import admit, admit_resume
+
+    if resume:
+        return admit_resume(place, case, notify, "fit")
+    admit(place, case, "fit", overwrite, notify)
+    return None
+
+
+def _check_fitted(fitted_place: Path, place: Path, case: "Case", overwrite: bool) -> None:
+    """Refuse to replace a fitted case that is not as the fit in the result file has written it. Raises StoreError.
+
+    fitted_place: where it is going to be. place: of the result file. case: which is fitted. overwrite: as of the
+    command.
+    """
+    from mdstopo.store.result_reader import read_result
+    from mdstopo.store.store_errors import StoreError
+
+    if not fitted_place.exists():
+        return
+    if case.path is not None and case.path.exists() and fitted_place.samefile(case.path):
+        raise StoreError(f"{fitted_place}: this is the case that is fitted; choose another place with --out")
+    if overwrite and fitted_place.is_file():
+        return
+    own = read_result(place, leave_out=("trajectories", "members")).texts if place.exists() else {}
+    written = own.get("fit/fitted_case")
+    if not fitted_place.is_file() or not isinstance(written, str) or fitted_place.read_bytes() != written.encode():
+        raise StoreError(
+            f"{fitted_place} is not as the fit in {place.name} has written it; --overwrite replaces it, --out chooses "
+            "another place"
+        )
+
+
+def _restored(problem: "FitProblem", before: "ResultView") -> "FitRun":
     """The run that is gone on with; refuses that of another case or of other measurements."""
-    from mdstopo.fit.record import asked
+    from mdstopo.fit.record import asked, content
     from mdstopo.fit.run_fit import restored
     from mdstopo.store.store_errors import StoreError
 
-    if before is None:
-        return None
-    if before["asked"] != asked(problem):
+    if before.texts.get("fit/asked") != asked(problem):
         raise StoreError(
-            f"{path}: the case, what is fitted, or what was measured is not the same; --overwrite begins anew"
+            f"{before.path}: what is fitted, or what was measured, is not the same; --overwrite begins anew"
         )
-    return restored(problem, before)
+    return restored(problem, content(before))
 
 
-def _say(output: Output, run: "FitRun", path: Path, written: Path | None) -> None:
-    problem = run.problem
-    output.say(f"{problem.case.title or problem.case.name}: {run.status.replace('_', ' ')} - {run.reason}")
-    if run.found is not None and run.statistics is not None:
-        share = f"{100.0 * problem.fit.confidence:g} %"
-        profiled = bool(run.profiles)
-        rows = [["estimate", "value", "deviation", f"{share} from", "to", *(["by profile from", "to"] * profiled),
-                 "derivative"]]  # fmt: skip
-        for i, name in enumerate(problem.names):
-            bound = int(run.statistics.at_bound[i])
-            ends = (run.statistics.deviation[i], run.statistics.low[i], run.statistics.high[i])
-            cells = ["-" if math.isnan(each) else number(each) for each in ends]
-            if bound:
-                cells[0] = f"at {'upper' if bound > 0 else 'lower'}"
-            if profiled:
-                own = run.profiles.get(name)
-                pair = (math.nan, math.nan) if own is None else (own.low, own.high)
-                cells += ["-" if math.isnan(each) else number(each) for each in pair]
-            rows.append([name, number(run.found.x[i], 7), *cells, problem.derivatives[i]])
-        output.table(rows)
-        _say_apart(output, run)
-        _say_series(output, run)
-    rows = [["simulations", str(run.simulations)]]
-    if problem.fit.starts > 1 and run.starts:
-        rows.append(["starts", f"{len(run.starts)}, {run.agreeing} of them at the same minimum"])
-    rows.append(["result", str(path)])
-    if written is not None:
-        rows.append(["fitted case", str(written)])
-    output.table(rows)
+def _draw(path: Path, picture_path: Path) -> None:
+    """The picture of a result."""
+    from mdstopo.plots.fit_plot import draw
+    from mdstopo.plots.source import Source
+    from mdstopo.plots.style import save, styled
 
-
-def _say_apart(output: Output, run: "FitRun") -> None:
-    """What the data cannot tell apart, and what varies together."""
-    assert run.statistics is not None
-    for each in run.statistics.directions:
-        parts = " ".join(f"{share:+.2g} {name}" for name, share in each.shares.items())
-        how = "not at all" if each.is_unknown else f"hardly: {number(each.change, 2)} deviations from bound to bound"
-        output.say(f"the data tell {how}: {parts} (shares of the way between bounds)")
-    names = run.problem.names
-    for i in range(len(names)):
-        for j in range(i):
-            both = float(run.statistics.correlation[i, j])
-            if abs(both) > 0.95:
-                output.say(f"{names[j]} and {names[i]} vary together: correlation {number(both, 4)}")
-
-
-def _say_series(output: Output, run: "FitRun") -> None:
-    assert run.found is not None
-    rows = [["series", "values", "root mean square left", "unit", "deviation", "squares / values"]]
-    from mdstopo.case.units import unit_of
-
-    for each, part in zip(run.problem.measured, run.problem.parts, strict=True):
-        misfit, deviation = run.found.misfit[part], run.found.deviation[part]
-        low, high = float(deviation.min()), float(deviation.max())
-        told = number(low, 4) if low == high else f"{number(low, 4)} to {number(high, 4)}"
-        squares = "" if each.deviation is None else number(float(((misfit / deviation) ** 2).mean()), 3)
-        rows.append(
-            [each.series.name, str(len(each.t)), number(float((misfit**2).mean()) ** 0.5, 4),
-             unit_of(each.series.response), told if each.deviation is not None else f"{told} (estimated)",
-             squares]
-        )  # fmt: skip
-    output.table(rows)
+    with styled() as module:
+        save(draw(module, Source(path)), picture_path)
 
 
 def _remarks(run: "FitRun") -> list[str]:

@@ -45,7 +45,8 @@ def command(
     """Draw what a result file holds.
 
     WHAT is one of layout, designs (start and final beside each other), convergence, design, sensitivities, histories,
-    sensitivity-histories, front; without it, everything that the file has is drawn.
+    sensitivity-histories, front, and of a fit fit, correlation, profiles; without it, everything that the file has is
+    drawn.
     \f
     Arguments, which --help leaves out:
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mdstopo.cli.fit_numbers import say_fit
 from mdstopo.cli.options import output_options, result_argument
 from mdstopo.cli.output import Output, duration, number
 from mdstopo.cli.uncertain_numbers import say_result
@@ -30,6 +31,7 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
     from mdstopo.store.result_reader import read_result
 
     output = Output(json=as_json, quiet=quiet)
+    fit: dict[str, Any] = {}
     view = read_result(result_path, leave_out=("optimizer", "pareto/tasks", "sweep/tasks", "combine/tasks"))
     output.say(f"{view.title or view.name}: {_ended(view)} - {view.reason}")
     output.say(f"made by `{view.provenance.get('command') or view.kind}` on {view.provenance.get('created', '?')}")
@@ -41,6 +43,11 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
         _say_front(output, view)
     if view.kind == "sweep":
         _say_sweep(output, view)
+    if view.kind == "fit":
+        from mdstopo.fit.record import content as fit_of
+
+        fit = {"fit": fit_of(view)}
+        say_fit(output, fit["fit"])
     _say_trajectories(output, view)
     _say_sensitivities(output, view)
     _say_members(output, view, count)
@@ -52,7 +59,7 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
         output.say(f"warning: {warning}")
     if not view.finished:
         output.say(f"to go on: {resume_command(view)}")
-    output.document(_document(view) | ({"bounds": known} if known else {}))
+    output.document(_document(view) | ({"bounds": known} if known else {}) | fit)
     return 0
 
 
@@ -81,10 +88,10 @@ def objective_names(view: "ResultView") -> list[str]:
 def resume_command(view: "ResultView") -> str:
     """The command that continues what is unfinished."""
     words = shlex.split(view.provenance.get("command", ""))
-    if words[:1] != ["mdstopo"] or words[1:2] not in (["run"], ["pareto"], ["sweep"]):
+    if words[:1] != ["mdstopo"] or words[1:2] not in (["run"], ["pareto"], ["sweep"], ["fit"]):
         words = ["mdstopo", view.kind, view.case_path or "CASE", "--out", str(view.path)]
     words = [word for word in words if word not in ("--overwrite", "--resume")]
-    place = 3 if words[1] == "run" else len(words)
+    place = 3 if words[1] in ("run", "fit") else len(words)
     return shlex.join([*words[:place], "--resume", *words[place:]])
 
 

@@ -17,10 +17,10 @@ from mdstopo.cli.output import Output
 @click.option("--open", "opens", is_flag=True, help="Open the page in the browser.")
 @click.option("--quiet", "-q", is_flag=True, help="Say nothing but the address.")
 def command(result_path: Path, port: int, opens: bool, quiet: bool) -> int:
-    """Follow a run, front or sweep on a page of this computer; Ctrl-C ends it.
+    """Follow a run, front, sweep or fit on a page of this computer; Ctrl-C ends it.
 
-    The page shows the best design, the iterations, the front or the table so far, and what is finished as well. The
-    result file is only read and never locked, and may come to be later. Nobody but this computer can open the page.
+    The page shows the best design, the iterations, the front, the table or the fit so far, and what is finished, too.
+    The result file is only read and never locked, and may come to be later. Nobody but this computer can open the page.
     \f
     Arguments, which --help leaves out:
 

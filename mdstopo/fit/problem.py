@@ -98,6 +98,10 @@ class FitProblem:
                 out[part, self.delays[s]] = -self._rates[s]
         return out
 
+    def left(self, misfit: FloatArray) -> FloatArray:
+        """(S,) the root mean square of a misfit (n,) in each series, in the unit of its response."""
+        return np.array([float(np.sqrt(np.mean(misfit[part] ** 2))) for part in self.parts])
+
     def predicted(self, x: FloatArray) -> list[FloatArray]:
         """Of each series, what should have been measured."""
         _, misfit = self.misfit(x)

@@ -1,70 +1,188 @@
-"""What is kept of a fit, as plain values for a JSON file: enough to draw it, to go on, and for other programs."""
+"""What is kept of a fit: datasets of a result file, and the same as plain values to be told, drawn and gone on with."""
 
 import hashlib
-import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mdstopo._version import __version__
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.model import Case
 from mdstopo.case.units import unit_of, words
+from mdstopo.engine import Evaluator
+from mdstopo.fit.prepared import case_at
 from mdstopo.fit.problem import FitProblem
 from mdstopo.fit.run_fit import FitRun
-from mdstopo.store.atomic import replace_file
+from mdstopo.store.contents import Datasets, case_part, design_part, trajectory_part
+from mdstopo.store.image import Attribute
+from mdstopo.store.provenance import Provenance
+from mdstopo.store.result_reader import ResultView
 from mdstopo.store.same_case import describe
-from mdstopo.store.store_errors import StoreError
+from mdstopo.store.store_errors import StoreError, WriteError
+from mdstopo.store.writing import write_result
 
-#: what the files are, and their version
-KIND = "mdstopo fit"
-VERSION = 1
+#: the kind of result files of fits
+KIND = "fit"
+#: names of bounds that hold an estimate, as files have them
+_BOUNDS = {-1: "lower", 1: "upper"}
 
 
-def content(run: FitRun) -> dict[str, Any]:
-    """All of a run."""
-    problem, case = run.problem, run.problem.case
-    whole: dict[str, Any] = plain(
-        {
-            "kind": KIND,
-            "version": VERSION,
-            "program": __version__,
-            "case": case.name,
-            "title": case.title,
-            "asked": asked(problem),
-            "status": run.status,
-            "reason": run.reason,
-            "simulations": run.simulations,
-            "loss": problem.fit.loss,
-            "confidence": problem.fit.confidence,
-            "estimates": [_estimate(run, i) for i in range(len(problem.names))],
-            "correlation": None if run.statistics is None else run.statistics.correlation,
-            "directions": None if run.statistics is None else [
-                {"shares": each.shares, "change": each.change, "unknown": each.is_unknown}
-                for each in run.statistics.directions
-            ],
-            "freedom": None if run.statistics is None else run.statistics.freedom,
-            "chi_square": None if run.statistics is None else run.statistics.chi_square,
-            "series": _series(run),
-            "starts": [
-                {
-                    "begin": each.begin,
-                    "x": each.x,
-                    "deviations": _deviations(problem, each.deviation),
-                    "level": each.level,
-                    "status": each.status,
-                    "reason": each.reason,
-                    "evaluations": each.evaluations,
-                }
-                for each in run.starts
-            ],
-            "best": run.best if run.starts else None,
-            "agreeing": run.agreeing if run.starts else 0,
-        }
-    )  # fmt: skip
-    return whole
+class FitFile:
+    """The result file of a fit, which is replaced as a whole whenever there is more to keep.
+
+    path: a place that this process may write. command: the command line, for the record.
+    """
+
+    def __init__(self, path: Path, problem: FitProblem, command: str = "") -> None:
+        self.path = path
+        self._case = problem.case
+        self._provenance = Provenance.collect(command)
+        self._fixed = case_part(problem.case) | design_part(problem.case, problem.case.start)
+        self._fixed |= _digests(problem)
+
+    def checkpoint(self, run: FitRun, notify: Callable[[str], None]) -> None:
+        """Save in the middle; what keeps it from being saved is told."""
+        try:
+            self._write("running", "running", datasets(run), ())
+        except WriteError as error:
+            notify(f"no checkpoint: {error}")
+
+    def conclude(self, run: FitRun, fitted_case: str | None, warnings: tuple[str, ...]) -> None:
+        """Save what has come to its end, with the fitted motion. Raises StoreError.
+
+        fitted_case: the text of the case with the fitted numbers. warnings: sentences.
+        """
+        part = datasets(run) | trajectory_part(_motions(run))
+        if fitted_case is not None:
+            part["fit/fitted_case"] = fitted_case
+        self._write(run.status, run.reason, part, warnings)
+
+    def _write(self, status: str, reason: str, part: Datasets, warnings: tuple[str, ...]) -> None:
+        fit = self._case.fit
+        assert fit is not None
+        settings: dict[str, Attribute] = {
+            "loss": fit.loss, "confidence": fit.confidence, "starts": fit.starts, "seed": fit.seed,
+        }  # fmt: skip
+        settings |= {f"set {key}": str(value) for key, value in self._case.overrides.items()}
+        whole = self._fixed | part
+        write_result(self.path, self._case, KIND, status, reason, whole, self._provenance, settings, warnings)
+
+
+def _digests(problem: FitProblem) -> Datasets:
+    """SHA-256 of the measured files that are there."""
+    folder = Path() if problem.case.path is None else problem.case.path.parent
+    files = {each.file: folder / each.file for each in problem.fit.series}
+    return {
+        f"files/{name}": hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items() if path.is_file()
+    }
+
+
+def _motions(run: FitRun) -> dict[str, Any]:
+    """The fitted motion in each load case that something was measured in."""
+    if run.found is None:
+        return {}
+    numbers = run.problem.numbers
+    evaluator = Evaluator(numbers.case_at(run.found.x[: len(numbers.keys)]), beside=False)
+    names = dict.fromkeys(each.load_case for each in run.problem.fit.series)
+    return {name: evaluator.trajectory(evaluator.case.start, name) for name in names}
+
+
+def datasets(run: FitRun) -> Datasets:
+    """All of a run, by the path in its file."""
+    problem = run.problem
+    part: Datasets = {
+        "asked": asked(problem),
+        "simulations": np.array(run.simulations),
+        "estimates": list(problem.names),
+        "derivative": list(problem.derivatives),
+        "lower": problem.lower,
+        "upper": problem.upper,
+        "initial": problem.initial,
+    }
+    if run.shown is not None:
+        part["value"] = run.shown.x
+    told = run.statistics
+    if told is not None:
+        part |= {
+            "deviation": told.deviation, "low": told.low, "high": told.high,
+            "at_bound": told.at_bound.astype(np.int64), "correlation": told.correlation,
+            "freedom": np.array(told.freedom), "chi_square": np.array(told.chi_square),
+            "directions/change": np.array([each.change for each in told.directions]),
+            "directions/unknown": np.array([each.is_unknown for each in told.directions], dtype=np.bool_),
+            "directions/shares": np.array(
+                [[each.shares.get(name, 0.0) for name in problem.names] for each in told.directions]
+            ).reshape(len(told.directions), len(problem.names)),
+        }  # fmt: skip
+    for name, own in run.profiles.items():
+        part |= {f"profiles/{name}/values": own.values, f"profiles/{name}/t": own.t}
+        part[f"profiles/{name}/ends"] = np.array([own.low, own.high])
+    part |= _series(run) | _starts(run) | _evaluations(run)
+    return {f"{KIND}/{name}": value for name, value in part.items()}
+
+
+def _series(run: FitRun) -> Datasets:
+    """What was measured, what is predicted there, and what is left."""
+    problem, shown = run.problem, run.shown
+    series = [each.series for each in problem.measured]
+    part: Datasets = {
+        "series/name": [each.name for each in series],
+        "series/file": [each.file for each in series],
+        "series/load_case": [each.load_case for each in series],
+        "series/response": [words(each.response) for each in series],
+        "series/unit": [unit_of(each.response) for each in series],
+        "series/deviation_estimated": np.array([each.deviation is None for each in problem.measured], dtype=np.bool_),
+    }
+    if shown is not None:
+        for key, places in (("offset", problem.offsets), ("delay", problem.delays)):
+            part[f"series/{key}"] = np.array(
+                [shown.x[p] if p >= 0 else getattr(each, key).initial for each, p in zip(series, places, strict=True)]
+            )
+        residuals = shown.misfit / shown.deviation
+        part["series/root_mean_square"] = problem.left(shown.misfit)
+        part["series/chi_square"] = np.array([float(np.sum(residuals[own] ** 2)) for own in problem.parts])
+    for each, own in zip(problem.measured, problem.parts, strict=True):
+        group = f"measured/{each.series.name}"
+        part |= {f"{group}/t": each.t, f"{group}/value": each.y}
+        if shown is not None:
+            part |= {f"{group}/predicted": each.y + shown.misfit[own], f"{group}/deviation": shown.deviation[own]}
+    return part
+
+
+def _starts(run: FitRun) -> Datasets:
+    """The starts that are done, and which of them is the best."""
+    p, s, done = len(run.problem.names), len(run.problem.measured), run.starts
+    part: Datasets = {
+        "starts/begin": np.array([each.begin for each in done]).reshape(len(done), p),
+        "starts/x": np.array([each.x for each in done]).reshape(len(done), p),
+        "starts/deviation": np.array([_deviations(run.problem, each.deviation) for each in done]).reshape(len(done), s),
+        "starts/level": np.array([each.level for each in done]),
+        "starts/status": [each.status for each in done],
+        "starts/reason": [each.reason for each in done],
+        "starts/evaluations": np.array([each.evaluations for each in done], dtype=np.int64),
+    }
+    if done:
+        part |= {"best": np.array(run.best), "agreeing": np.array(run.agreeing)}
+    return part
+
+
+def _evaluations(run: FitRun) -> Datasets:
+    """How the fit came where it is: every motion that the starts have tried."""
+    p, s, trace = len(run.problem.names), len(run.problem.measured), run.trace
+    return {
+        "evaluations/start": np.array([each.start for each in trace], dtype=np.int64),
+        "evaluations/x": np.array([each.x for each in trace]).reshape(len(trace), p),
+        "evaluations/root_mean_square": np.array([each.left for each in trace]).reshape(len(trace), s),
+    }
+
+
+def _deviations(problem: FitProblem, deviation: FloatArray) -> list[float]:
+    """Of each series the deviation that was estimated, NaN where it is stated."""
+    return [
+        float(deviation[part.start]) if each.deviation is None else math.nan
+        for each, part in zip(problem.measured, problem.parts, strict=True)
+    ]
 
 
 def asked(problem: FitProblem) -> str:
@@ -77,23 +195,93 @@ def asked(problem: FitProblem) -> str:
     return digest.hexdigest()
 
 
-def write(run: FitRun, path: Path) -> None:
-    """Put a run into its file, as a whole or not at all. Raises StoreError."""
-    replace_file(path, (json.dumps(content(run), indent=1, allow_nan=False) + "\n").encode())
+# -- read back
 
 
-def read(path: Path) -> dict[str, Any]:
-    """The content of a file. Raises StoreError where it is none of a fit."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise StoreError(f"{path}: this is no result of `mdstopo fit`: it is not JSON") from error
-    if not isinstance(found, dict) or found.get("kind") != KIND:
-        raise StoreError(f"{path}: this is no result of `mdstopo fit`")
-    if found.get("version") != VERSION:
-        raise StoreError(f"{path}: found version {found.get('version')}, this program reads {VERSION}")
+def fitted_case(view: ResultView, case: Case) -> Case:
+    """The case that is looked at in pictures: with the fitted numbers, and the measured series as its objectives.
+
+    case: that of the file, with the numbers as they were stated.
+    """
+    assert case.fit is not None
+    keys = [each.key for each in case.fit.numbers]
+    values = view.arrays.get(f"{KIND}/value")
+    x = np.array([each.range.initial for each in case.fit.numbers]) if values is None else values[: len(keys)]
+    return case_at(case, keys, np.asarray(x, dtype=np.float64))
+
+
+def content(view: ResultView) -> dict[str, Any]:
+    """A fit as plain values, as JSON has them; null for what is not known. Raises StoreError where it is no fit."""
+    if view.kind != KIND:
+        raise StoreError(f"{view.path} holds a result of `{view.kind}`, not of `fit`")
+    arrays = view.under(KIND)
+    whole: dict[str, Any] = plain(
+        {
+            "case": view.name,
+            "title": view.title,
+            "status": view.status,
+            "reason": view.reason,
+            "loss": view.settings.get("loss", "linear"),
+            "confidence": view.settings.get("confidence", 0.95),
+            **{
+                key: arrays.get(key)
+                for key in ("simulations", "correlation", "freedom", "chi_square", "best", "agreeing")
+            },
+            "estimates": _read_estimates(view),
+            "directions": _read_directions(view),
+            "series": _read_series(view),
+            "starts": _rows(view, "starts", texts=("status", "reason")),
+            "evaluations": _rows(view, "evaluations"),
+        }
+    )
+    return whole
+
+
+def _rows(view: ResultView, group: str, texts: tuple[str, ...] = ()) -> list[dict[str, Any]]:
+    """The columns of a group as one mapping for each row."""
+    columns: dict[str, Any] = dict(view.under(f"{KIND}/{group}"))
+    columns |= {name: view.lines(f"{KIND}/{group}/{name}") for name in texts}
+    count = min((len(column) for column in columns.values()), default=0)
+    return [{name: column[k] for name, column in columns.items()} for k in range(count)]
+
+
+def _read_estimates(view: ResultView) -> list[dict[str, Any]]:
+    arrays, found = view.under(KIND), []
+    names = view.lines(f"{KIND}/estimates")
+    for i, (name, how) in enumerate(zip(names, view.lines(f"{KIND}/derivative"), strict=True)):
+        own: dict[str, Any] = {"name": name, "derivative": how}
+        own |= {key: arrays[key][i] for key in ("lower", "upper", "initial")}
+        own |= {key: arrays[key][i] for key in ("value", "deviation", "low", "high") if key in arrays}
+        if "at_bound" in arrays:
+            own["at_bound"] = _BOUNDS.get(int(arrays["at_bound"][i]))
+        if f"profiles/{name}/t" in arrays:
+            values, t, (low, high) = (arrays[f"profiles/{name}/{key}"] for key in ("values", "t", "ends"))
+            own["profile"] = {"values": values, "t": t, "low": low, "high": high}
+        found.append(own)
+    return found
+
+
+def _read_directions(view: ResultView) -> list[dict[str, Any]] | None:
+    arrays, names = view.under(f"{KIND}/directions"), view.lines(f"{KIND}/estimates")
+    if "change" not in arrays:
+        return None
+    return [
+        {
+            "shares": {name: share for name, share in zip(names, arrays["shares"][k], strict=True) if share != 0.0},
+            "change": change,
+            "unknown": arrays["unknown"][k],
+        }
+        for k, change in enumerate(arrays["change"])
+    ]
+
+
+def _read_series(view: ResultView) -> list[dict[str, Any]]:
+    found = _rows(view, "series", texts=("name", "file", "load_case", "response", "unit"))
+    for own in found:
+        own |= {
+            {"value": "measured"}.get(key, key): column
+            for key, column in view.under(f"{KIND}/measured/{own['name']}").items()
+        }
     return found
 
 
@@ -108,59 +296,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
     return value
-
-
-def _estimate(run: FitRun, i: int) -> dict[str, Any]:
-    problem = run.problem
-    estimate: dict[str, Any] = {
-        "name": problem.names[i],
-        "lower": problem.lower[i],
-        "upper": problem.upper[i],
-        "initial": problem.initial[i],
-        "derivative": problem.derivatives[i],
-    }
-    if run.found is not None and run.statistics is not None:
-        estimate |= {
-            "value": run.found.x[i],
-            "deviation": run.statistics.deviation[i],
-            "low": run.statistics.low[i],
-            "high": run.statistics.high[i],
-            "at_bound": {-1: "lower", 1: "upper"}.get(int(run.statistics.at_bound[i])),
-        }
-    own = run.profiles.get(problem.names[i])
-    if own is not None:
-        estimate["profile"] = {"values": own.values, "t": own.t, "low": own.low, "high": own.high}
-    return estimate
-
-
-def _series(run: FitRun) -> list[dict[str, Any]]:
-    problem, found = run.problem, []
-    for each, part in zip(problem.measured, problem.parts, strict=True):
-        own: dict[str, Any] = {
-            "name": each.series.name,
-            "file": each.series.file,
-            "load_case": each.series.load_case,
-            "response": words(each.series.response),
-            "unit": unit_of(each.series.response),
-            "deviation_estimated": each.deviation is None,
-            "t": each.t,
-            "measured": each.y,
-        }
-        if run.found is not None:
-            misfit = run.found.misfit[part]
-            own |= {
-                "predicted": each.y + misfit,
-                "deviation": run.found.deviation[part],
-                "root_mean_square": float(np.sqrt(np.mean(misfit**2))),
-                "chi_square": float(np.sum(run.found.residuals[part] ** 2)),
-            }
-        found.append(own)
-    return found
-
-
-def _deviations(problem: FitProblem, deviation: FloatArray) -> list[float | None]:
-    """Of each series the deviation that was estimated, None where it is stated."""
-    return [
-        float(deviation[part.start]) if each.deviation is None else None
-        for each, part in zip(problem.measured, problem.parts, strict=True)
-    ]

@@ -12,7 +12,7 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray
 from mdstopo.fit.problem import FitProblem
 from mdstopo.fit.profile import Profile, profile
-from mdstopo.fit.solve import Minimum, StoppedError, fitted, minimum, starts
+from mdstopo.fit.solve import Evaluated, Minimum, StoppedError, fitted, minimum, starts
 from mdstopo.fit.statistics import Statistics, statistics
 
 #: fits whose levels differ by less than this, relative to the number of values, have found the same minimum
@@ -32,23 +32,42 @@ class Start:
     evaluations: int
 
 
+@dataclass(frozen=True)
+class Tried:
+    """One evaluation: in which start, x (p,) where, and the root mean square that is left in each series (S,)."""
+
+    start: int
+    x: FloatArray
+    left: FloatArray
+
+
 @dataclass
 class FitRun:
     """What is known of a fit so far.
 
-    starts: those that are done. found, statistics: the best, and its statistics; None where none has a motion.
-    profiles: by the name of the estimate. status: running | converged | max_iterations | failed | interrupted;
-    reason: in words. simulations: motions that were computed.
+    starts: those that are done. trace: all evaluations of the starts. latest: the last of them. found, statistics: the
+    best, and its statistics; None where none has a motion, or before all starts are done. profiles: by the name of the
+    estimate. status: running | converged | max_iterations | failed | interrupted; reason: in words. simulations:
+    motions that were computed.
     """
 
     problem: FitProblem
     starts: list[Start] = field(default_factory=list)
+    trace: list[Tried] = field(default_factory=list)
+    latest: Evaluated | None = None
     found: Minimum | None = None
     statistics: Statistics | None = None
     profiles: dict[str, Profile] = field(default_factory=dict)
     status: str = "running"
     reason: str = ""
     simulations: int = 0
+
+    @property
+    def shown(self) -> Evaluated | None:
+        """What the fit has come to so far: the minimum, before there is one the last evaluation."""
+        if self.found is None:
+            return self.latest
+        return Evaluated(self.found.x, self.found.misfit, self.found.deviation)
 
     @property
     def best(self) -> int:
@@ -68,26 +87,35 @@ def run_fit(
     before: FitRun | None = None,
     save: Callable[[FitRun], None] = lambda _: None,
     stop: Callable[[], bool] = lambda: False,
+    passing: Callable[[FitRun], None] = lambda _: None,
 ) -> FitRun:
     """Fit a case.
 
     problem: what is fitted.
     points: of profiles, on each side of an estimate; 0: none.
     before: what is known from a run that was stopped.
-    save: is given what is known, whenever that has become more.
+    save: is given what is known when a start or a profile is done, so that it need not be done again.
     stop: whether to end, which is asked before each motion.
+    passing: is given what is known after each evaluation of a start.
     """
     run = FitRun(problem) if before is None else before
     earlier = run.simulations
     run.status, run.found, run.statistics = "running", None, None
+    run.trace = [each for each in run.trace if each.start < len(run.starts)]
 
     def keep() -> None:
         run.simulations = earlier + problem.simulations
         save(run)
 
+    def seen(evaluated: Evaluated) -> None:
+        run.latest = evaluated
+        run.trace.append(Tried(len(run.starts), evaluated.x, problem.left(evaluated.misfit)))
+        run.simulations = earlier + problem.simulations
+        passing(run)
+
     try:
         for begin in starts(problem)[len(run.starts) :]:
-            end = fitted(problem, begin, stop)
+            end = fitted(problem, begin, stop, seen)
             run.starts.append(Start(begin, end.x, end.deviation, end.level, end.status, end.reason, end.evaluations))
             keep()
         _conclude(run)
@@ -101,7 +129,7 @@ def run_fit(
         if run.starts and run.found is None:
             _conclude(run)
         run.status, run.reason = "interrupted", "stopped on request; what is done is kept"
-    keep()
+    run.simulations = earlier + problem.simulations
     return run
 
 
@@ -109,6 +137,7 @@ def _conclude(run: FitRun) -> None:
     """The best minimum so far, with everything that is known there."""
     best = run.starts[run.best]
     if best.status == "failed":
+        run.latest = None
         return
     problem = run.problem
     at = minimum(problem, best.x, best.deviation, held=np.arange(len(best.x)))
@@ -134,12 +163,14 @@ def _unprofiled(run: FitRun, points: int) -> list[str]:
 
 def restored(problem: FitProblem, content: Mapping[str, Any]) -> FitRun:
     """What a run that was stopped had done, from what `record.content` made of it."""
-    run = FitRun(problem, simulations=int(content["simulations"]))
+    run = FitRun(problem, simulations=int(content["simulations"] or 0))
     for each in content["starts"]:
         level = float("inf") if each["level"] is None else float(each["level"])
-        deviation = _deviations(problem, each["deviations"])
+        deviation = _deviations(problem, each["deviation"])
         end = each["status"], each["reason"], int(each["evaluations"])
         run.starts.append(Start(np.array(each["begin"]), np.array(each["x"]), deviation, level, *end))
+    for each in content["evaluations"]:
+        run.trace.append(Tried(int(each["start"]), np.array(each["x"]), np.array(each["root_mean_square"])))
     for each in content["estimates"]:
         if each.get("profile") is not None:
             own = {key: np.array(value, dtype=np.float64) for key, value in each["profile"].items()}

@@ -6,6 +6,7 @@ which ends at the most likely of both. Estimates are scaled by their bounds.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -69,6 +70,22 @@ class Minimum:
         return self.slopes / self.deviation[:, None]
 
 
+#: is told of what the fit has evaluated
+Seen = Callable[["Evaluated"], None]
+
+
+class Evaluated(NamedTuple):
+    """An evaluation: x (p,), the misfit (n,) there, and the deviation (n,) of each value that counts at the time."""
+
+    x: FloatArray
+    misfit: FloatArray
+    deviation: FloatArray
+
+
+def _unseen(_evaluated: Evaluated) -> None:
+    """Nobody wants to know."""
+
+
 def stated_deviations(problem: FitProblem) -> FloatArray:
     """(n,) the deviations that are known; NaN where they are not."""
     return np.concatenate(
@@ -80,8 +97,12 @@ def fitted(
     problem: FitProblem,
     start: FloatArray,
     stop: Callable[[], bool] = lambda: False,
+    seen: Seen = _unseen,
 ) -> Minimum:
-    """The fit from a start (p,), with its deviations. Raises StoppedError."""
+    """The fit from a start (p,), with its deviations. Raises StoppedError.
+
+    stop: as of `minimum`. seen: is given every evaluation that has a motion.
+    """
     known = stated_deviations(problem)
     unknown = [s for s, part in enumerate(problem.parts) if np.isnan(known[part.start])]
     deviation = known.copy()
@@ -92,7 +113,7 @@ def fitted(
     # while deviations still change much, the minimum need not be found closely
     cost = LOOSE if unknown else COST
     for _ in range(TURNS):
-        found = minimum(problem, x, deviation, stop=stop, precision=cost)
+        found = minimum(problem, x, deviation, stop=stop, precision=cost, seen=seen)
         evaluations += found.evaluations
         if found.status == "failed":
             return replace(found, evaluations=evaluations)
@@ -134,6 +155,7 @@ def minimum(
     held: IndexArray | None = None,
     stop: Callable[[], bool] = lambda: False,
     precision: float = COST,
+    seen: Seen = _unseen,
 ) -> Minimum:
     """The nearest minimum with known deviations.
 
@@ -143,6 +165,7 @@ def minimum(
     held: estimates that stay where they are.
     stop: is asked before each motion; where it says yes, StoppedError is raised.
     precision: relative change of the cost at which it ends.
+    seen: is given every evaluation that has a motion.
     """
     from scipy.optimize import least_squares
 
@@ -163,6 +186,8 @@ def minimum(
         trouble, misfit = problem.misfit(whole(u))
         if trouble and evaluations == 1:
             raise MotionError(trouble)
+        if not trouble:
+            seen(Evaluated(whole(u), misfit, deviation))
         return misfit / deviation
 
     def jacobian(u: FloatArray) -> FloatArray:

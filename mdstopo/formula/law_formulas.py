@@ -69,6 +69,16 @@ class Program(NamedTuple):
         return any("t" in names_in(group.values[3]) for group in self.groups[first : first + self.switches])
 
     @property
+    def by_time(self) -> int:
+        """The group with the slope of the force by time."""
+        return len(self.groups) - 1
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether the force depends on time by itself, within a mode."""
+        return not is_number(self.groups[-1].values[0], 0.0)
+
+    @property
     def operations(self) -> int:
         """How many operations all groups have, equal ones of a group once."""
         return sum(sum(1 for _ in parts(*group.values)) for group in self.groups)
@@ -92,7 +102,7 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
     Names in them are x, xd, t, l0, "p 0" and so on for parameters, "bit 0" and so on for switches. Groups are: f, f_x,
     f_xd, V, V_x; the smallest margin; then for each parameter, and for the free length, f_p, V_p; then for each switch
     its margin g, g_x, g_xd, g_t, and whether it is looked at; then g_p, by switches, for each parameter and the free
-    length. Margins and their slopes are divided by `_near`. Raises TooManySwitchesError.
+    length; last f_t. Margins and their slopes are divided by `_near`. Raises TooManySwitchesError.
     """
     found = _smooth(force, energy, damping, names)
     if force is None:
@@ -116,6 +126,8 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
         groups.append(_group((value, *slopes, relevant)))
     for (margin, _), size in zip(found.switches, near, strict=True):
         groups += [_group((divide(derivative(margin, word), size),)) for word in words]
+    by_time = derivative(f, "t")
+    groups.append(_group((by_time,), _limited([(by_time, ONE)])))
     return Program(tuple(groups), len(names), len(found.switches))
 
 

@@ -14,7 +14,7 @@ from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in
 from mdstopo.general.drives import drives, drives_all, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel
-from mdstopo.general.variables import adds_damping, each_member, lasting_times, varied, watched_times
+from mdstopo.general.variables import adds_damping, as_computed, each_member, lasting_times, varied, watched_times
 from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.laws import table as laws
@@ -69,6 +69,7 @@ def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[s
 
 def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     """The arrays of one load case."""
+    case = as_computed(case)
     include_kernels(case)
     dimension = dimension_of(case)
     bodies = dimension.kinematics

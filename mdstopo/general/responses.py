@@ -70,7 +70,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     turn_motion,
     turn_of,
 )
-from mdstopo.mechanics.laws.table import law, law_is_idle, law_is_timed
+from mdstopo.mechanics.laws.table import law, law_by_time, law_is_idle, law_is_timed, law_lacks_rate
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -139,16 +139,16 @@ def rate_is_by_state(model, j):
 
 @kernel
 def is_plain(model, group):
-    """Whether forces of a group depend on elongations and their rates alone: no inerters, no laws of time."""
+    """Whether rates of a group's forces are formulas: no inerters, no laws of time whose slope is not known."""
     for k in range(model.block.shape[0]):
-        if model.block[k, GROUP] == group and (model.block[k, CODE] == INERTER or law_is_timed(model.block[k, CODE])):
+        if model.block[k, GROUP] == group and (model.block[k, CODE] == INERTER or law_lacks_rate(model.block[k, CODE])):
             return False
     return True
 
 
 @kernel
 def follows_state(tag, model, j):
-    """Whether the rate of response j is g_q v + g_v a on the motion of a method."""
+    """Whether the rate of response j is g_q v + g_v a on the motion of a method, and a known slope by time."""
     kind = model.response[j, KIND]
     if kind == MEMBER_FORCE:
         return derivatives(tag) > 1 and is_plain(model, model.response[j, SUBJECT])
@@ -291,11 +291,53 @@ def group_rates(model, member_state, segment, t, group, q, v, a, rel, out):
             x -= member_state[SET, i]
             rest = model.member[MEMBER_FREE_LENGTH, i]
             f, by_x, by_rate, _, _ = law(code, model.law[k], x, rate, mode, t, value, model.curves, rest)
-            slope = by_x * rate
+            slope = by_x * rate + law_by_time(code, model.law[k], x, rate, mode, t, model.curves, rest)
             if by_rate != 0.0:
                 slope += by_rate * second_rate(model, i, rel[p], second)
             out[0, first + i] += scale * f
             out[1, first + i] += scale * slope
+
+
+@kernel
+def force_by_time(model, member_state, segment, t, group, i, q, v):
+    """Slope by time, at a fixed state, of |f*| of one member of a group that is plain (`is_plain`), N/s.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      group, i: the group, and the number of the member in it.
+      q (n_q,), v (n,): coordinates and velocities.
+    """
+    total = 0.0
+    slope = 0.0
+    own = np.empty((2, pair_freedoms(model)))
+    timed = False
+    for k in range(model.block.shape[0]):
+        if model.block[k, GROUP] == group and law_is_timed(model.block[k, CODE], model.law[k], model.curves):
+            timed = True
+    if not timed:
+        return 0.0
+    for k in range(model.block.shape[0]):
+        own_i = i - model.block[k, OFFSET]
+        if (
+            model.block[k, GROUP] != group
+            or model.active[segment, k] == 0
+            or own_i < 0
+            or own_i >= model.block[k, COUNT]
+        ):
+            continue
+        m = model.block[k, START] + own_i
+        x, rate = member_rows(model, model.block[k, PAIR], m, q, v, own[0], own[1])
+        x -= member_state[SET, m]
+        code, mode, rest = model.block[k, CODE], int(member_state[MODE, m]), model.member[MEMBER_FREE_LENGTH, m]
+        value = level_of(model, segment, k, t)
+        f, _, _, _, _ = law(code, model.law[k], x, rate, mode, t, value, model.curves, rest)
+        total += member_state[SCALE, m] * f
+        slope += member_state[SCALE, m] * law_by_time(code, model.law[k], x, rate, mode, t, model.curves, rest)
+    return slope if total >= 0.0 else -slope
 
 
 @kernel
@@ -825,7 +867,8 @@ def rated(
     """Value of response j and its rate in time at a state within a step.
 
     Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, the rate is
-    dg/dt = g_q v + g_v a (`follows_state`); else it is differenced along the method's own motion.
+    dg/dt = g_q v + g_v a (`follows_state`), and for a member's force its slope by time; else it is differenced along
+    the method's own motion.
 
     Constant:
       tag: the method of integration (`method_interface`).
@@ -873,6 +916,8 @@ def rated(
         if order > 0 or needs_accelerations(kind):
             for d in range(n):
                 rate += bars[1, d] * a[d]
+        if kind == MEMBER_FORCE:
+            rate += force_by_time(model, member_state, segment, t, model.response[j, SUBJECT], who, q, v)
         return value, rate, made
     apart = APART * (history.t[k + 1] - history.t[k])
     sides = np.zeros(2)

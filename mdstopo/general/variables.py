@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mdstopo.case.laws.expression import OfFormulas
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Case, Law, LoadCase, MemberGroup, Variable
 from mdstopo.general.kinks import landed
@@ -71,6 +72,15 @@ def _blocks(case: Case, block: IndexArray) -> dict[tuple[str, int], list[int]]:
     return found
 
 
+def as_computed(case: Case) -> Case:
+    """The case as kernels have it: laws by formula that are linear springs are springs."""
+    if not any(isinstance(law, OfFormulas) for group in case.members for law in group.laws):
+        return case
+    from mdstopo.general.formula_springs import with_springs
+
+    return with_springs(case)
+
+
 def varied(case: Case, block: IndexArray) -> IndexArray:
     """(n_varied, 4): block, place of the parameter, which value, rising; the last column is set by `Placing`."""
     if not case.variables:
@@ -98,6 +108,7 @@ class Placing:
         self._fine = has_coarse_steps(case.solver)
         #: block -> its law, and which value each parameter takes
         self._taken: dict[int, tuple[Law, dict[str, int]]] = {}
+        case = as_computed(case)
         blocks = _blocks(case, model.block)
         first = 0
         for variable in case.variables:

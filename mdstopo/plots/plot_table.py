@@ -34,6 +34,9 @@ PLOTS: dict[str, Plot] = {
     "sensitivity-histories": Plot(
         ("histories", "draw_sensitivities"), "dg/dalpha over time, from `gradient --history`", ("members",)
     ),
+    "fit": Plot(("fit", "draw"), "of a fit: measured and fitted series, and what is left"),
+    "correlation": Plot(("fit", "draw_correlation"), "of a fit: how estimates vary together"),
+    "profiles": Plot(("fit", "draw_profiles"), "of a fit: how it gets worse as one estimate is held elsewhere"),
     "front": Plot(("front", "draw"), "the front and every design visited", ("marked",)),
 }
 
@@ -56,6 +59,16 @@ def fitting(view: ResultView) -> list[str]:
         found.append("sensitivities")
     if alphas and any("/history/" in path for path in paths):
         found.append("sensitivity-histories")
+    if view.kind == "fit":
+        return [*_of_fit(view), "layout"]
     if motions and view.lines("objectives"):
         found.append("histories")
     return found
+
+
+def _of_fit(view: ResultView) -> list[str]:
+    """The pictures of a fit that there is enough known for."""
+    found = ["fit"] if "fit/value" in view.arrays else []
+    if "fit/correlation" in view.arrays:
+        found.append("correlation")
+    return [*found, "profiles"] if view.under("fit/profiles") else found

@@ -42,8 +42,13 @@ class Source:
 
     @cached_property
     def case(self) -> Case:
-        """The case as it was read, with what --set changed."""
-        return case_of(self.view)
+        """The case as it was read, with what --set changed; of a fit the fitted one, looking at what was measured."""
+        case = case_of(self.view)
+        if self.view.kind != "fit":
+            return case
+        from mdstopo.fit.record import fitted_case
+
+        return fitted_case(self.view, case)
 
     @property
     def title(self) -> str:
@@ -52,8 +57,8 @@ class Source:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The objectives' names."""
-        return self.view.lines("objectives")
+        """The objectives' names; of a fit those of the measured series."""
+        return self.view.lines("fit/series/name" if self.view.kind == "fit" else "objectives")
 
     @cached_property
     def alpha(self) -> Floats:

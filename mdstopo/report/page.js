@@ -104,6 +104,7 @@
     parent.replaceChildren();
     cursors.length = 0;
     const m = motion();
+    if (data.fit) { fitted(parent, m); return; }
     if (!m) return;
     m.responses.forEach((each) => {
       const place = data.objectives.findIndex((o) => o.name === each.name), objective = data.objectives[place];
@@ -113,6 +114,59 @@
       const cursor = element(c.svg, "line", { y1: c.top, y2: c.bottom, stroke: "#000", "stroke-dasharray": "3 3", class: "cursor" });
       cursors.push(() => { const x = c.px(m.t[state.frame]); cursor.setAttribute("x1", x); cursor.setAttribute("x2", x); });
     });
+  };
+
+  // of a fit: each series as measured and as fitted, and what is left of it
+  const fitted = (parent, m) => {
+    data.fit.series.forEach((each, k) => {
+      if (each.load_case !== state.load) return;
+      const colour = COLOURS[k % COLOURS.length], [times, values] = each.curve || [[], []];
+      const c = chart(parent, `${each.name}, measured and fitted`, "time, s", `${each.response}, ${each.unit}`, each.t.concat(m ? m.t : times), each.measured.concat(values));
+      line(c, times, values, colour);
+      each.t.forEach((t, i) => element(c.svg, "circle", { cx: c.px(t), cy: c.py(each.measured[i]), r: 2.2, fill: "none", stroke: "#222", class: "measured" }));
+      if (m) {
+        const cursor = element(c.svg, "line", { y1: c.top, y2: c.bottom, stroke: "#000", "stroke-dasharray": "3 3", class: "cursor" });
+        cursors.push(() => { const x = c.px(m.t[state.frame]); cursor.setAttribute("x1", x); cursor.setAttribute("x2", x); });
+      }
+      if (!each.residual) return;
+      const r = chart(parent, `${each.name}, what is left`, "time, s", "fitted - measured, deviations", each.t.concat(m ? m.t : []), each.residual.concat([-2, 2]));
+      for (const level of [-2, 0, 2]) line(r, [Math.min(...each.t), Math.max(...each.t)], [level, level], "#999").setAttribute("stroke-dasharray", level ? "4 3" : "0");
+      each.t.forEach((t, i) => element(r.svg, "circle", { cx: r.px(t), cy: r.py(each.residual[i]), r: 2.2, fill: colour, class: "residual" }));
+    });
+  };
+  const correlation = (parent) => {
+    const names = data.fit.estimates.map((each) => each.name), rows = data.fit.correlation, n = names.length, L = Math.min(250, 34 + 6 * Math.max(...names.map((name) => name.length))), side = Math.min(46, (455 - L) / n), H = n * side + 18;
+    if (!rows || n < 2) return;
+    parent.appendChild(Object.assign(document.createElement("h2"), { textContent: "how errors of estimates go together: correlations" }));
+    const svg = element(parent, "svg", { viewBox: `0 0 460 ${H}`, role: "img", "aria-label": "correlations of estimates", class: "correlation" });
+    rows.forEach((row, i) => {
+      element(svg, "text", { x: L - 6, y: (i + 0.5) * side + 4, "text-anchor": "end" }, `${names[i]}  ${i + 1}`);
+      element(svg, "text", { x: L + (i + 0.5) * side, y: n * side + 13, "text-anchor": "middle" }, String(i + 1));
+      row.forEach((value, j) => {
+        element(svg, "rect", { x: L + j * side, y: i * side, width: side - 1, height: side - 1, fill: value === null ? "#f2f2f2" : shade(value * Math.abs(value)) });
+        if (side > 24) element(svg, "text", { x: L + (j + 0.5) * side, y: (i + 0.5) * side + 4, "text-anchor": "middle", style: value !== null && Math.abs(value) > 0.7 ? "fill: #fff" : "" }, value === null ? "-" : value.toFixed(2));
+      });
+    });
+  };
+  const profiles = (parent) => {
+    data.fit.profiles.forEach((each, k) => {
+      const c = chart(parent, `profile of ${each.name}${k ? "" : "; dotted: the parabola of its interval, which ends at the dashed line"}`, each.name, "rise of the squares", each.fine, each.parabola.concat(each.between, each.rise));
+      line(c, [each.fine[0], each.fine[each.fine.length - 1]], [each.end, each.end], "#999").setAttribute("stroke-dasharray", "5 4");
+      line(c, each.fine, each.parabola, "#666").setAttribute("stroke-dasharray", "1.5 3");
+      line(c, each.fine, each.between, COLOURS[0]);
+      each.values.forEach((x, i) => mark2(c, x, each.rise[i], COLOURS[0]));
+    });
+  };
+  const estimates = (parent) => {
+    const fit = data.fit, known = fit.estimates.some((each) => each.low !== undefined), profiled = fit.profiles.length > 0, share = `${number(100 * fit.confidence)} %`;
+    if (fit.estimates[0].value === undefined) return;
+    table(parent, ["estimate", "value", ...(known ? ["standard deviation", `${share} from`, "to"] : []), ...(profiled ? ["by profile from", "to"] : []), "between", "derivative"],
+      fit.estimates.map((each) => [each.name, number(each.value, 7), ...(known ? [each.at_bound ? `at its ${each.at_bound} bound` : number(each.deviation, 3), number(each.low, 6), number(each.high, 6)] : []),
+        ...(profiled ? [number(each.profile_low, 6), number(each.profile_high, 6)] : []), `${number(each.lower)} and ${number(each.upper)}`, each.derivative]));
+    table(parent, ["series", "values", "root mean square left", "deviation", "squares / values"],
+      fit.series.map((each) => [each.name, String(each.t.length), `${number(each.root_mean_square, 4)} ${each.unit}`,
+        `${[...new Set(each.deviation)].map((x) => number(x, 4)).join(" to ")}${each.deviation_estimated ? " (estimated)" : ""}`, each.deviation_estimated ? "" : number(each.chi_square / each.t.length, 3)]));
+    for (const sentence of fit.sentences) parent.appendChild(Object.assign(document.createElement("p"), { textContent: sentence, className: "bound" }));
   };
 
   const mark2 = (c, x, y, colour) => element(c.svg, "circle", { cx: c.px(x), cy: c.py(y), r: 3.5, fill: colour });
@@ -179,6 +233,7 @@
   const SENSE = { limit: "at most", at_least: "at least", equals: "equal to" };
   const results = () => {
     const parent = at("results");
+    if (data.fit) estimates(parent);
     if (data.front) table(parent, ["point", ...data.objectives.map((o) => `${o.name}, ${o.unit}`), ""],
       data.front.objectives.map((p, j) => [String(j), ...p.map((x) => number(x, 7)), ended(data.front.status[j], data.front.kkt[j])]));
     else if (data.summary && data.summary.length) table(parent, ["objective", "start", "design", "change"],
@@ -241,6 +296,7 @@
   });
   state.design = Math.max(0, data.front ? data.designs.findIndex((d, j) => d.members && j >= Math.floor(data.designs.length / 2)) : 0);
   front(); convergence(); results(); refresh();
+  if (data.fit) { correlation(at("convergence")); profiles(at("convergence")); }
   if (globalThis.addEventListener) globalThis.addEventListener("beforeprint", () => { for (const each of document.querySelectorAll("details")) each.open = true; });
   document.body.dataset.ready = "yes";
 })();

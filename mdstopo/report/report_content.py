@@ -21,6 +21,7 @@ from mdstopo.plots.symbols import LOADS, Symbol, symbols
 from mdstopo.plots.thickness import families, strongest, thickness
 from mdstopo.plots.views import upright
 from mdstopo.plots.watch import response_history
+from mdstopo.report.fit_tables import fit_part
 from mdstopo.report.report_tables import best_iterate, constraint_rows, member_peaks, objective_rows, parts, peak_of
 from mdstopo.store.whole_front import whole_front
 
@@ -73,6 +74,8 @@ def content(source: Source) -> dict[str, Any]:
         for kind, glyph in glyphs().items()
         if kind in kinds
     }
+    if view.kind == "fit":
+        page["fit"] = _rounded_part(fit_part(source))
     iterations = view.under("iterations")
     if "combined" in iterations:
         page["iterations"] = {
@@ -287,6 +290,16 @@ def _rounded(array: Any, digits: int = 6) -> Any:
     factor = 10.0 ** np.clip(digits - 1 - size, -300, 300)
     plain = np.where(np.isfinite(values), np.round(values * factor) / factor, np.nan)
     return _plain(plain.tolist())
+
+
+def _rounded_part(value: Any) -> Any:
+    """A mapping, or a list of such, with its lists of numbers rounded."""
+    if isinstance(value, dict):
+        return {key: _rounded_part(each) for key, each in value.items()}
+    if isinstance(value, list):
+        numbers = all(isinstance(each, (int, float)) for each in value)
+        return _rounded(value) if numbers and value else [_rounded_part(each) for each in value]
+    return value
 
 
 def _plain(value: Any) -> Any:

@@ -21,6 +21,7 @@ import numpy as np
 from mdstopo.case.units import unit_of_value
 from mdstopo.plots.animation import still
 from mdstopo.plots.source import Source
+from mdstopo.report.fit_tables import fit_part
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.store_errors import StoreError
 
@@ -95,6 +96,8 @@ def state_of(view: ResultView, source: Source) -> dict[str, Any]:
         "warnings": list(view.warnings),
     }
     arrays = view.arrays
+    if view.kind == "fit":
+        state["fit"] = fit_part(source, curves=False, rows=ROWS)
     if "iterations/combined" in arrays:
         state["iterations"] = _iterations(view)
     if "pareto/objectives" in arrays:

@@ -11,7 +11,7 @@ from mdstopo.store.store_errors import DamagedError, DifferentCaseError, StoreEr
 
 Notify = Callable[[str], None]
 
-_NAMES = {"run": "run", "pareto": "front", "sweep": "sweep"}
+_NAMES = {"run": "run", "pareto": "front", "sweep": "sweep", "fit": "fit"}
 _SHOWN = 6  # differing keys that a message lists
 
 

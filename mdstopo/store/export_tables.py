@@ -18,7 +18,7 @@ Table = tuple[list[str], list[Sequence[Any]]]
 
 
 def tables(view: ResultView, case: Case) -> dict[str, Table]:
-    """Header and rows by name: members, iterations, front, sweep, samples, each load case's trajectory."""
+    """Header and rows by name: members, iterations, front, sweep, fit, samples, each load case's trajectory."""
     found: dict[str, Table] = {"members": _members(view, case)}
     names = view.lines("objectives")
     iterations = view.under("iterations")
@@ -37,6 +37,8 @@ def tables(view: ResultView, case: Case) -> dict[str, Table]:
         named = {path.removeprefix("sweep/values/"): value for path, value in values.items()}
         sweep = {key: value for key, value in sweep.items() if key != "alpha" and value.ndim <= 2}
         found["sweep"] = _columns("run", named | sweep, {"objectives": names}, "objectives")
+    if view.kind == "fit":
+        found |= _fit(view)
     for name, group in (("sample", "uncertainty"), ("fresh-sample", "uncertainty/validation")):
         if f"{group}/objectives" in view.arrays:
             found[name] = _points(view, group)
@@ -70,6 +72,21 @@ def _members(view: ResultView, case: Case) -> Table:
             header.append(name)
             columns.append(whole.tolist())
     return header, [list(row) for row in zip(*columns, strict=True)]
+
+
+def _fit(view: ResultView) -> dict[str, Table]:
+    """Estimates, each measured series, and all that was tried."""
+    arrays, names = view.under("fit"), view.lines("fit/estimates")
+    columns = [key for key in ("value", "deviation", "low", "high", "lower", "upper", "initial") if key in arrays]
+    rows: list[Sequence[Any]] = [[name, *(arrays[key][i].item() for key in columns)] for i, name in enumerate(names)]
+    found: dict[str, Table] = {"estimates": (["estimate", *columns], rows)}
+    series = view.lines("fit/series/name")
+    for name in series:
+        own = view.under(f"fit/measured/{name}")
+        found[f"measured-{name}"] = _columns("number", own, {}, "t")
+    tried = view.under("fit/evaluations")
+    found["evaluations"] = _columns("evaluation", tried, {"x": names, "root_mean_square": series}, "start")
+    return found
 
 
 def _points(view: ResultView, group: str) -> Table:

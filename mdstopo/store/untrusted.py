@@ -27,6 +27,7 @@ _KNOWN = frozenset(
         "design",
         "differences",
         "files",
+        "fit",
         "iterations",
         "members",
         "objectives",

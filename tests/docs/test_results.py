@@ -50,6 +50,18 @@ constraints: [{volume: all, equals: 1}]
 optimizer: {max_iterations: 1}
 """
 
+FITTED = """\
+format: 1
+time: {end: 0.1}
+bodies: {cart: {mass: 1, inertia: 1, position: [1, 0], velocity: [1, 0]}}
+fit:
+  estimate:
+    bodies.cart.velocity[0]: {lower: 0, upper: 3}
+    bodies.cart.position[0]: {lower: 0.5, upper: 1.5}
+  measured:
+    way: {file: way.csv, response: {displacement: {body: cart, component: x}}, delay: {lower: -0.01, upper: 0.01}}
+"""
+
 UNCERTAIN = """\
 uncertainty: {parameters: {bodies.cargo.mass: {normal: {deviation: 5}}}, sample: 4, validation: 30}
 """
@@ -81,6 +93,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     (folder / "varied.yaml").write_text(VARIED, encoding="utf-8")
     (folder / "staged.yaml").write_text(STAGED, encoding="utf-8")
     (folder / "priced.yaml").write_text(PRICED, encoding="utf-8")
+    (folder / "fitted.yaml").write_text(FITTED, encoding="utf-8")
+    (folder / "way.csv").write_text("0.02, 0.03\n0.04, 0.07\n0.06, 0.1\n0.08, 0.14\n", encoding="utf-8")
     (folder / "turn.csv").write_text("0, 1\n1, 2\n", encoding="utf-8")
     for command in (
         "simulate jointed.yaml",
@@ -96,6 +110,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "gradient varied.yaml --history --differences",
         "pareto varied.yaml --points 4 --starts 1",
         "sweep set varied.yaml members.spring.law.stiffness=8,9 optimizer.starts=1",
+        "fit fitted.yaml --profile 1",
         "sweep set boat.yaml members.belts.law.stiffness=4000,5000 optimizer.max_iterations=1",
     ):
         done = run(f"mdstopo {command}", folder)

@@ -12,7 +12,11 @@ import pytest
 from mdstopo.case.reader import load_case
 from mdstopo.cli.group import run_group
 from mdstopo.fit import run_fit as module
-from mdstopo.fit.solve import StoppedError
+from mdstopo.fit.record import content
+from mdstopo.store.output_file import output_file
+from mdstopo.store.result_reader import read_result
+
+from .test_fits import stop_after
 
 FALL = """\
 format: 1
@@ -45,15 +49,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def result(path: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
+    return content(read_result(path))
 
 
 def test_it_writes_result_case_and_picture(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     assert run_group(["fit", "fall.yaml", "--plot", "fall.svg", "--profile", "2"]) == 0
     said = capsys.readouterr()
-    found = result(folder / "results" / "fall.fit.json")
+    found = result(folder / "results" / "fall.fit.h5")
     gravity, velocity = found["estimates"]
     assert found["status"] == "converged"
     assert gravity["low"] < -9.81 < gravity["high"]
@@ -66,18 +69,31 @@ def test_it_writes_result_case_and_picture(folder: Path, capsys: pytest.CaptureF
     fitted = load_case(folder / "results" / "fall.fitted.yaml")
     assert fitted.load_cases[0].gravity[1] == gravity["value"]
     assert "<svg" in (folder / "fall.svg").read_text(encoding="utf-8")
-    before = (folder / "results" / "fall.fit.json").read_bytes()
+
+
+def test_a_result_is_replaced_and_a_fitted_case_that_was_changed_is_not(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place, case = folder / "results" / "fall.fit.h5", folder / "results" / "fall.fitted.yaml"
+    assert run_group(["fit", "fall.yaml", "--quiet"]) == 0
+    written = case.read_bytes()
+    assert run_group(["fit", "fall.yaml"]) == 0
+    assert "the finished result in" in capsys.readouterr().err
+    before = place.read_bytes()
+    case.write_bytes(written + b"# mine\n")
     assert run_group(["fit", "fall.yaml"]) == 2
-    assert "exists already" in capsys.readouterr().err
-    assert (folder / "results" / "fall.fit.json").read_bytes() == before
+    assert "is not as the fit in fall.fit.h5 has written it" in capsys.readouterr().err
+    assert place.read_bytes() == before
+    assert case.read_bytes() == written + b"# mine\n"
     assert run_group(["fit", "fall.yaml", "--overwrite", "--quiet"]) == 0
+    assert case.read_bytes() == written
 
 
 def test_json_is_one_object(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_group(["fit", "fall.yaml", "--json", "--out", "there/own.json"]) == 0
+    assert run_group(["fit", "fall.yaml", "--json", "--out", "there/own.h5"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["command"] == "fit"
-    assert said["path"] == "there/own.json"
+    assert said["path"] == "there/own.h5"
     assert [each["name"] for each in said["estimates"]] == ["gravity[1]", "bodies.stone.velocity[1]"]
 
 
@@ -85,31 +101,40 @@ def test_a_run_that_is_stopped_goes_on(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     many = ["--set", "fit.starts=3"]
-    assert run_group(["fit", "fall.yaml", *many, "--out", "whole.json"]) == 0
-    whole = result(folder / "whole.json")
+    assert run_group(["fit", "fall.yaml", *many, "--out", "whole.h5"]) == 0
+    whole = result(folder / "whole.h5")
     own = module.fitted
     calls = []
 
-    def interrupted(problem: Any, start: Any, stop: Callable[[], bool]) -> Any:
+    def interrupted(problem: Any, start: Any, stop: Callable[[], bool], seen: Callable[[Any], None]) -> Any:
         calls.append(start)
         if len(calls) == 2:
-            raise StoppedError
-        return own(problem, start, stop)
+            own(problem, start, stop_after(2), seen)
+        return own(problem, start, stop, seen)
 
     monkeypatch.setattr(module, "fitted", interrupted)
     assert run_group(["fit", "fall.yaml", *many]) == 3
     assert "--resume" in capsys.readouterr().err
-    place = folder / "results" / "fall.fit.json"
-    assert [len(result(place)["starts"]), result(place)["status"]] == [1, "interrupted"]
+    place = folder / "results" / "fall.fit.h5"
+    stopped = result(place)
+    assert [len(stopped["starts"]), stopped["status"]] == [1, "interrupted"]
+    assert [each["start"] for each in stopped["evaluations"]].count(1) == 2
+    assert run_group(["show", str(place)]) == 0
+    assert f"mdstopo fit fall.yaml --resume --out {place.resolve()}" in capsys.readouterr().out
+    assert run_group(["fit", "fall.yaml", *many]) == 2
+    assert "holds an unfinished run (interrupted)" in capsys.readouterr().err
     assert (folder / "results" / "fall.fitted.yaml").exists()
     monkeypatch.setattr(module, "fitted", own)
     assert run_group(["fit", "fall.yaml", *many, "--resume"]) == 0
     again = result(place)
     assert [each["x"] for each in again["starts"]] == [each["x"] for each in whole["starts"]]
-    assert again["estimates"] == whole["estimates"]
-    # another case is not gone on with
+    for key in ("estimates", "series", "correlation", "evaluations"):
+        assert again[key] == whole[key]
+    # another fit, and another case, are not gone on with
     assert run_group(["fit", "fall.yaml", "--set", "fit.starts=4", "--resume"]) == 2
     assert "not the same" in capsys.readouterr().err
+    assert run_group(["fit", "fall.yaml", *many, "--set", "bodies.stone.mass=2", "--resume"]) == 2
+    assert "it differs in bodies.stone.mass" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -122,8 +147,7 @@ def test_a_run_that_is_stopped_goes_on(
         ),
         (["--set", "time.end=0.5"], "found the time 0.6, and 3 more such times, allowed is 0 to 0.5 s"),
         (["--plot", "fall.txt"], "a picture ends in"),
-        (["--resume"], "there is no result to go on with"),
-        (["--resume", "--overwrite"], "say --resume or --overwrite, not both"),
+        (["--resume", "--overwrite"], "--resume and --overwrite exclude each other"),
     ],
 )
 def test_what_cannot_be_is_refused(
@@ -133,7 +157,7 @@ def test_what_cannot_be_is_refused(
     said = capsys.readouterr().err
     assert told in said
     assert "Traceback" not in said
-    assert not (folder / "results" / "fall.fit.json").exists()
+    assert not (folder / "results" / "fall.fit.h5").exists()
 
 
 def test_a_case_without_a_fit_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -142,11 +166,17 @@ def test_a_case_without_a_fit_is_refused(folder: Path, capsys: pytest.CaptureFix
     assert "plain.yaml:1:1: the key 'fit' is missing" in capsys.readouterr().err
 
 
-def test_a_file_that_is_no_result_is_not_gone_on_with(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for text in ("no json", "[]", '{"kind": "mdstopo fit", "version": 99}'):
-        (folder / "own.json").write_text(text, encoding="utf-8")
-        assert run_group(["fit", "fall.yaml", "--out", "own.json", "--resume"]) == 2
-        assert "own.json: " in capsys.readouterr().err
+def test_a_file_that_is_no_fit_is_not_gone_on_with(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "own.h5").write_text("no result", encoding="utf-8")
+    assert run_group(["fit", "fall.yaml", "--out", "own.h5", "--resume"]) == 2
+    assert "own.h5: not a result file of mdstopo" in capsys.readouterr().err
+    with output_file(folder / "motion.h5", load_case("fall.yaml"), "simulate", overwrite=False, notify=print) as file:
+        file.write("converged", "", {}, {})
+    assert run_group(["fit", "fall.yaml", "--out", "motion.h5", "--resume"]) == 2
+    assert "motion.h5 holds a result of `simulate`" in capsys.readouterr().err
+    assert run_group(["fit", "fall.yaml", "--out", "fall.yaml", "--overwrite"]) == 2
+    assert "this is the case file" in capsys.readouterr().err
+    assert (folder / "fall.yaml").read_text(encoding="utf-8").startswith("format: 1")
 
 
 def test_other_commands_take_a_case_with_a_fit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from mdstopo.fit.problem import FitProblem
 
@@ -39,6 +40,7 @@ fit:
     define.v: {lower: 0, upper: 1}
     gravity[1]: {lower: -12, upper: -8}
     loads[0].force[0]: {lower: 0, upper: 3}
+    joints[0].at[0]: {lower: 0.2, upper: 0.3}
     members.spring.to.at[1]: {lower: 0.05, upper: 0.15}
   measured:
     lift: {file: a.csv, response: {displacement: {body: block, component: y}}, offset: {lower: -1, upper: 1}}
@@ -67,6 +69,22 @@ fit:
   measured:
     lift: {file: a.csv, response: {displacement: {body: block, component: y}}}
     speed: {file: b.csv, response: {velocity: {body: block, component: y}}}
+"""
+#: an arm that is let go from the side, and where its pin is
+PENDULUM = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 1}
+bodies:
+  arm: {mass: 2, inertia: 0.1, position: [0.5, 0]}
+joints:
+  - {name: pin, type: revolute, bodies: [ground, arm], at: [0.1, 0]}
+fit:
+  estimate:
+    joints[0].at[0]: {lower: -0.1, upper: 0.3}
+  measured:
+    swing: {file: a.csv, response: {angle: {body: arm}}}
+    lift: {file: b.csv, response: {displacement: {body: arm, component: y}}}
 """
 TIMES = np.linspace(0.0, 0.98, 15)
 
@@ -101,7 +119,7 @@ def test_derivatives_are_those_of_differences(linked: FitProblem) -> None:
     x[linked.names.index("delay of blow")] = 0.001
     x[linked.names.index("offset of lift")] = 0.01
     x[linked.names.index("define.v")] = 0.31
-    assert linked.derivatives.count("differences") == 1
+    assert linked.derivatives.count("differences") == 2
     check(linked, x)
 
 
@@ -110,6 +128,25 @@ def test_so_are_those_of_members_that_keep_a_permanent_set() -> None:
     crushed = problem_of(CRUSHED, {"lift": t, "speed": t})
     assert set(crushed.derivatives) == {"exact"}
     check(crushed, crushed.initial)
+
+
+def test_the_place_of_a_joint_is_differentiated_as_the_equation_of_a_pendulum_has_it() -> None:
+    t = np.linspace(0.05, 1.0, 20)
+    problem = problem_of(PENDULUM, {"swing": t, "lift": t})
+    assert problem.derivatives == ("differences",)
+    slopes = problem.slopes(np.array([0.1]))[:, 0]
+
+    def rates(_t: float, y: np.ndarray, d: float) -> list[float]:
+        """Angle, its rate, and their derivatives by the distance d of the pin from the centre of mass."""
+        angle, rate, by_d, rate_by_d = y
+        about = 0.1 + 2.0 * d**2
+        pull, pull_by_d = 2.0 * 9.81 * d / about, 2.0 * 9.81 * (about - 4.0 * d**2) / about**2
+        return [rate, -pull * np.cos(angle), rate_by_d, -pull_by_d * np.cos(angle) + pull * np.sin(angle) * by_d]
+
+    found = solve_ivp(rates, (0.0, 1.0), np.zeros(4), args=(0.4,), rtol=1e-13, atol=1e-14, method="DOP853", t_eval=t)
+    angle, by_d = found.y[0], found.y[2]
+    expected = -np.concatenate([by_d, np.sin(angle) + 0.4 * np.cos(angle) * by_d])
+    assert np.abs(slopes - expected).max() < 1e-8 * np.abs(expected).max()
 
 
 def test_values_are_those_of_the_motion(linked: FitProblem) -> None:
@@ -126,5 +163,5 @@ def test_a_motion_is_computed_once_for_values_and_derivatives(linked: FitProblem
     linked.misfit(linked.initial)
     assert linked.simulations == before + 1
     linked.slopes(linked.initial)
-    # the one number that needs differences takes two more
-    assert linked.simulations == before + 3
+    # the two numbers that need differences take two more each
+    assert linked.simulations == before + 5

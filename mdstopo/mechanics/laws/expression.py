@@ -1,7 +1,8 @@
 """`expression`: force and energy are formulas. Parameters: those of the formulas; last, where its data begin.
 
 The data are where the machine code of the formulas is (`compiler.formulas`), the number of parameters, that of
-switches, and whether any of these depends on time. Its groups of numbers are those of `formula.law_formulas`.
+switches, whether any of these depends on time, and which group has the force's slope by time, 0 where that is none. Its
+groups of numbers are those of `formula.law_formulas`.
 
 The mode's bits say on which side each switch is; as long as they stay the formulas are smooth (`formula.modes`).
 """
@@ -28,7 +29,8 @@ def expression_data(record: OfFormulas, at: int) -> tuple[list[float], list[floa
     values = list(record.values.values())
     row = [*values, *[0.0] * (AT - len(values)), float(at)]
     timed = float(made.has_timed_switches)
-    return row, [float(address_of(made.groups)), float(made.parameters), float(made.switches), timed]
+    by_time = float(made.by_time if made.is_timed else 0)
+    return row, [float(address_of(made.groups)), float(made.parameters), float(made.switches), timed, by_time]
 
 
 def expression_is_smooth(record: OfFormulas) -> bool:
@@ -85,6 +87,30 @@ def expression_rest_slopes(p, x, xd, mode, t, curves, l0):
     at = int(p[AT])
     by_force, by_energy, _, _, _ = call_formula(curves[at], p, x, xd, t, l0, mode, FIRST + int(curves[at + 1]))
     return by_force, by_energy
+
+
+@inline
+def expression_is_timed(p, curves):
+    """Whether the force depends on time by itself."""
+    return curves[int(p[AT]) + 4] > 0.0
+
+
+@inline
+def expression_by_time(p, x, xd, mode, t, curves, l0):
+    """df/dt at fixed elongation and rate.
+
+    p (PARAMETERS,): its parameters, and where its data begin.
+    x, xd: elongation (m) and its rate (m/s).
+    mode: the bits of the switches.
+    t: time (s).
+    curves: data of all laws.
+    l0: free length (m).
+    """
+    if not expression_is_timed(p, curves):
+        return 0.0
+    at = int(p[AT])
+    by, _, _, _, _ = call_formula(curves[at], p, x, xd, t, l0, mode, int(curves[at + 4]))
+    return by
 
 
 @inline
@@ -376,6 +402,8 @@ KERNELS = LawKernels(
     force=expression_force,
     slopes=expression_slopes,
     rest_slopes=expression_rest_slopes,
+    by_time=expression_by_time,
+    is_timed=expression_is_timed,
     unstretched=expression_unstretched,
     modes=Modes(
         margin=expression_margin,

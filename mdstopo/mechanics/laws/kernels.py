@@ -84,6 +84,8 @@ class LawKernels:
     force: f, f_x, f_xd, V, V_x: force in N, its slopes by x and xd, stored energy in J and its slope by x.
     slopes: df/dp, dV/dp by the parameter at a place; None where no parameter may vary.
     rest_slopes: df/dl0, dV/dl0 by the free length at fixed elongation; None where there are none.
+    by_time: df/dt in N/s at fixed elongation and rate; None where the force is not of time, or by a table of it.
+    is_timed (p, curves): whether `by_time` may be other than zero; None where it may always be.
     unstretched (p, curves): the largest force that does not come from elongation; None where there is none, or it is
     given.
     modes: of a law that switches. permanent_set: of one that remembers, which switches too.
@@ -101,6 +103,8 @@ class LawKernels:
     force: Function | None = None
     slopes: Function | None = None
     rest_slopes: Function | None = None
+    by_time: Function | None = None
+    is_timed: Function | None = None
     unstretched: Function | None = None
     modes: Modes | None = None
     permanent_set: PermanentSet | None = None

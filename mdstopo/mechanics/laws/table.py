@@ -157,10 +157,31 @@ def law_is_given(code):
     return False
 
 
-@chosen(LISTED, lambda each: True if _asks_for_time(each) else None, inline)
-def law_is_timed(code):
-    """Whether the force depends on time by itself."""
+@chosen(LISTED, lambda each: True if _asks_for_time(each) and each.by_time is None else None, inline)
+def law_lacks_rate(code):
+    """Whether the force depends on time by itself, and its slope by time is not known."""
     return False
+
+
+@chosen(LISTED, lambda each: (each.is_timed or True) if each.by_time else None, inline)
+def law_is_timed(code, p, curves):
+    """Whether the force has a slope by time that is known, and may be other than zero."""
+    return False
+
+
+@chosen(LISTED, lambda each: each.by_time, inline)
+def law_by_time(code, p, x, xd, mode, t, curves, l0):
+    """Slope of the force by time, at fixed elongation and rate, N/s.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
+    """
+    return 0.0
 
 
 # Modes
