@@ -163,10 +163,21 @@ def build_constraints(
             volume = _volume_row(fields, sense, top, groups, variables, reading)
             if volume is not None:
                 built.append(volume)
-                volumes.append((inside(fields.path, sense or ""), volume))
+                if not _lengths_vary(volume, groups, variables):
+                    volumes.append((inside(fields.path, sense or ""), volume))
     if groups is not None:
         check_feasible(volumes, [group for group in groups.values() if group.design], variables, reading)
     return tuple(built)
+
+
+def _lengths_vary(row: VolumeRow, groups: dict[str, MemberGroup] | None, variables: tuple[Variable, ...]) -> bool:
+    """Whether members that a row sums up cost a length that varies: then what it comes to is not known here."""
+    moving = {each.points for each in variables if each.points}
+    return any(
+        groups[name].cost_by_length and bool(moving & {groups[name].from_points, groups[name].to_points})
+        for name in row.groups
+        if groups is not None and name in groups
+    )
 
 
 def _response_row(

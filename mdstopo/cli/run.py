@@ -225,6 +225,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     from mdstopo.case.units import words
     from mdstopo.case.words import count_text
     from mdstopo.cli.show import values_text
+    from mdstopo.scene.moving_volumes import spent
 
     case, lines = outcome.case, []
     for i, (row, excess) in enumerate(zip(case.constraints, outcome.constraints.tolist(), strict=True)):
@@ -235,7 +236,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
             lines.append((f"{row.over_time} {words(row.response)}{where}", found))
             lines += [(title, sentence) for title, sentence in lines_of(outcome.conclusion, f"constraints[{i}]")]
         else:
-            used = row.spent(np.concatenate([outcome.alpha, *outcome.variables.values()]))
+            used = spent(case, row, np.concatenate([outcome.alpha, *outcome.variables.values()]))
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))
     width = case.upper - case.lower
