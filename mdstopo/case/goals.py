@@ -10,6 +10,7 @@ import numpy as np
 
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.candidates import coefficients_of
+from mdstopo.case.catalogue import with_catalogue
 from mdstopo.case.design_variables import prices
 from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
@@ -55,7 +56,13 @@ def apply_design(top: Fields, groups: dict[str, MemberGroup], reading: Reading) 
         good &= _check_numbers(values, name, design, reading)
     if not good:
         return None
-    return {name: replace(group, **numbers.get(name, {})) for name, group in groups.items()}
+    designed = {name: replace(group, **numbers.get(name, {})) for name, group in groups.items()}
+    chosen = with_catalogue(top, designed, reading)
+    if chosen is None:
+        return None
+    for name, (sizes, prices_of_sizes) in chosen.items():
+        designed[name] = replace(designed[name], sizes=sizes, prices=prices_of_sizes)
+    return designed
 
 
 def _for_group(stated: Any, group: str, key: str) -> Any:

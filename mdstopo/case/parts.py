@@ -152,7 +152,8 @@ class MemberGroup(Value):
     powers: where an optimisation goes from one power to the next: all of them, the last one being `power`.
     candidates: of a priced group all that could be members, of which the M are those that have been built; else None.
     from_points, to_points: the names of the point grids that P and Q are; empty for a point in place.
-    cost_by_length: whether V_i is the initial length.
+    cost_by_length: whether V_i is the initial length. sizes: what alpha can be in the end, rising; any, where there are
+    none; prices: what stands in volume rows for each of them in the place of alpha.
     """
 
     name: str
@@ -177,6 +178,8 @@ class MemberGroup(Value):
     from_points: str = ""
     to_points: str = ""
     cost_by_length: bool = False
+    sizes: tuple[float, ...] = ()
+    prices: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("from_local", "to_local", "from_world", "to_world", "length", "cost"):

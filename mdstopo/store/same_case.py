@@ -23,7 +23,7 @@ _IGNORED: dict[type, set[str]] = {
     MemberGroup: {"from_points", "to_points", "cost_by_length"},  # its ends and its costs are compared
 }
 # What later versions added, and left out by most: files from before know nothing of it.
-_ADDED = {"shared", "mirrored", "variables", "prices", "powers", "candidates", "movable", "points"}
+_ADDED = {"shared", "mirrored", "variables", "prices", "powers", "candidates", "movable", "points", "sizes"}
 _DESIGN = {"initial", "lower", "upper", "power"}
 _MAY_DIFFER = {"optimizer.max_iterations", "optimizer.tolerance", "optimizer.starts"}
 
@@ -102,6 +102,8 @@ def _key(path: str, field: str, owner: Any) -> str:
         return _join(path, "law")
     if isinstance(owner, Case) and field == "movable":
         return "points.movable"
+    if isinstance(owner, MemberGroup) and field in ("sizes", "prices"):
+        return f"design.catalogue.{owner.name}.{field}"
     if isinstance(owner, Case) and field in _ADDED and field != "points":
         return f"design.{field}"
     if isinstance(owner, LoadCase) and field in ("start", "end"):
