@@ -72,6 +72,7 @@ PAGES = {
 TOLD = {
     "fit": "docs/fitting.md",
     "bound": "docs/theory/bound.md",
+    "catalogue": "docs/catalogue.md",
     "priced": "docs/theory/pricing.md",
     "securing": "docs/applications/cargo.md",
 }
