@@ -10,7 +10,9 @@ import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.movable import placed
 from mdstopo.case.reader import read_case
+from mdstopo.case.rotations import about_axis
 from mdstopo.finalize.finalize_design import finalize, opened, ready
+from mdstopo.finalize.lift import lifted
 from mdstopo.plots.source import Source
 from mdstopo.scene.bodies import stands_as
 from mdstopo.scene.moving_volumes import spent
@@ -261,6 +263,23 @@ def test_pictures_show_points_where_the_design_has_them(tmp_path):
     source = Source(place)
     assert source.case.points["wall"].world[:, 1] == pytest.approx(outcome.variables["wall.along"] - 1.0, abs=1e-12)
     assert np.array_equal(source.stated.points["wall"].world, [[-1, 0.6], [-1, 0.1], [-1, -0.6]])
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 2.0, 0.5)])
+def test_a_lifted_case_has_its_points_in_the_same_regions(axis):
+    line = "{line: {from: [-1, -1], to: [-1, 1]}}"
+    rectangle = "{rectangle: {center: [-1, 0], size: [0.4, 3]}}"
+    for within, names in ((line, ["wall.along"]), (rectangle, ["wall.u", "wall.v"])):
+        planar = read_case(BEAM.replace(line, within))
+        spatial = read_case(lifted(planar, axis, 0.7))
+        assert [each.name for each in spatial.variables] == names
+        turn = about_axis(axis, 0.7)
+        design = [spatial.start.copy(), planar.start.copy()]
+        for each, case in zip(design, (spatial, planar), strict=True):
+            each[case.n_design :] = [0.5 * (v.lower + v.upper) for v in case.variables for _ in range(v.count)]
+        there = placed(planar, design[1]).points["wall"].world
+        flat = np.column_stack([there, np.zeros(len(there))])
+        assert placed(spatial, design[0]).points["wall"].world == pytest.approx(flat @ turn.T, abs=1e-12)
 
 
 MISTAKES = [
