@@ -19,6 +19,7 @@ SECTIONS = {
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",
     "priced": "candidates that are priced beside all of them built: prices, optima, times; more than 1e8 of them",
+    "catalogue": "sizes chosen from a catalogue by branch and bound beside the best of all choices",
     "chain": "cost of a step against the number of jointed bodies",
     "space": "objective and exact gradient of one scene in the plane and in space",
     "profile": "where the time of the applications goes: force sums by what they are for, and milliseconds",
@@ -55,7 +56,7 @@ PEERS_IN_SPACE = ("peers_space", "ring_space", "forward_space")
 CAMPAIGNS = ("damage", "hunt", "hunt_space")
 
 #: sections that take an hour, or measure nothing, are run where they are named
-NAMED = (*PEERS, *PEERS_IN_SPACE, *CAMPAIGNS, "optimum", "parts", "golden", "lifts", "priced")
+NAMED = (*PEERS, *PEERS_IN_SPACE, *CAMPAIGNS, "optimum", "parts", "golden", "lifts", "priced", "catalogue")
 
 #: the page that holds the tables of each section which `--readme` writes
 PAGES = {
@@ -73,6 +74,7 @@ TOLD = {
     "fit": "docs/fitting.md",
     "formulas": "docs/expressions.md",
     "bound": "docs/theory/bound.md",
+    "catalogue": "docs/catalogue.md",
     "priced": "docs/theory/pricing.md",
     "securing": "docs/applications/cargo.md",
 }

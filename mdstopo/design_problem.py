@@ -20,6 +20,7 @@ from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
 from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.scene.moving_volumes import moving_volumes
 from mdstopo.scene.refusals import refusals
 from mdstopo.status import Status
 
@@ -72,9 +73,13 @@ class DesignProblem:
         self.upper: Floats
         self.lower, self.upper = self.space.bounds(case.lower, case.upper)
         self._responses = [(i, row) for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)]
+        #: sums of lengths that vary, and what bounds them
+        moving = moving_volumes(case)
+        self._moving = [(volume, case.constraints[i]) for i, volume in moving.items()]
         #: whether rows compete from the start: limits on responses, objectives that are no energy, parameters of laws
         self.competes = (
             bool(self._responses)
+            or bool(self._moving)
             or self.even > 0
             or any(not kind_of(objective.response).is_energy for objective in self._objectives)
         )
@@ -85,11 +90,12 @@ class DesignProblem:
         few, many = Rows(*NEAR, cones=cones), Rows(*ALL, cones=cones)
         #: the peaks that an evaluation is asked for
         self.rows = (many if members else few) if self.competes else USUAL
-        self.linear = _linear_rows([row for row in case.constraints if isinstance(row, VolumeRow)], self.space)
+        fixed = [row for i, row in enumerate(case.constraints) if isinstance(row, VolumeRow) and i not in moving]
+        self.linear = _linear_rows(fixed, self.space)
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows of U at x; a design that cannot be computed comes back with its status."""
-        return self.sample_of(self.evaluation(x, gradient), gradient)
+        return self.sample_of(self.evaluation(x, gradient), gradient, x)
 
     def evaluation(self, x: Floats, gradient: bool = True) -> Evaluation:
         """What the engine finds at x, with as many rows as compete."""
@@ -116,18 +122,18 @@ class DesignProblem:
         parts = zip(places, np.split(weights, ends[:-1]), strict=True)
         return self._evaluator.asked_of_members({name: part.tolist() for name, part in parts})
 
-    def sample_of(self, evaluation: Evaluation, gradient: bool = True) -> Sample:
-        """The rows of U of an evaluation."""
+    def sample_of(self, evaluation: Evaluation, gradient: bool = True, x: Floats | None = None) -> Sample:
+        """The rows of U of an evaluation; x: of the design, where sums of lengths vary with it."""
         info = {name: np.full(self._count, np.nan) for name in ("objectives", "peak_time")}
         for place, objective in zip(self._places, self._objectives, strict=True):
             info["objectives"][place] = evaluation.objectives[objective.name]
             info["peak_time"][place] = evaluation.peak_times[objective.name]
-        if self._responses:
+        if self._responses or self._moving:
             info["constraints"] = evaluation.constraints
         if not evaluation.status.usable:
             return Sample(np.inf, status=evaluation.status, message=evaluation.message, info=info)
         parts = [self._part(o, s, evaluation) for o, s in zip(self._objectives, self._signs, strict=True)]
-        limits, slopes, groups, own_cones = self._limits(evaluation)
+        limits, slopes, groups, own_cones = self._limits(evaluation, x)
         cones = Cones.none()
         if self.scalarisation is None:
             rows, gradients = parts[0]
@@ -202,7 +208,7 @@ class DesignProblem:
             return values, slopes[0][None]
         return values, np.array(slopes).reshape(len(slopes), len(self.initial))
 
-    def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats, Ints, "Cones"]:
+    def _limits(self, evaluation: Evaluation, x: Floats | None) -> tuple[Floats, Floats, Ints, "Cones"]:
         """Rows, gradients, groups and cones of constraints on responses, feasible where <= 0, relative to their bounds.
 
         Every competing peak is a row (bound formulation); an equality makes two groups.
@@ -227,7 +233,28 @@ class DesignProblem:
         matrix = np.empty((len(slopes), len(self.initial)))
         for slope, (gradient, sign, scale) in zip(matrix, slopes, strict=True):
             np.divide(np.multiply(self._pull(gradient), sign, out=slope), scale, out=slope)
-        return np.array(rows), matrix, np.array(groups, dtype=np.int64), Cones.of(shapes, self._pull)
+        cones = Cones.of(shapes, self._pull)
+        if not self._moving:
+            return np.array(rows), matrix, np.array(groups, dtype=np.int64), cones
+        sums, more = self._volumes(x)
+        first = groups[-1] + 1 if groups else 0
+        groups += range(first, first + len(sums))
+        matrix = np.concatenate([matrix, more]) if len(matrix) == len(rows) else matrix
+        return np.concatenate([rows, sums]), matrix, np.array(groups, dtype=np.int64), cones.extended(len(sums))
+
+    def _volumes(self, x: Floats | None) -> tuple[Floats, Floats]:
+        """Sums of lengths that vary as rows of `_limits`, of the design as it is, not as softened."""
+        assert x is not None
+        design = self.space.expand(x)
+        rows: list[float] = []
+        slopes: list[Floats] = []
+        for volume, row in self._moving:
+            spent, slope = volume.at(design)
+            scale = abs(row.bound) if row.bound != 0.0 else 1.0
+            for sign in SIGNS[row.sense]:
+                rows.append(sign * (spent - row.bound) / scale)
+                slopes.append(sign / scale * self.space.vjp(slope))
+        return np.array(rows), np.array(slopes)
 
 
 class Cones(NamedTuple):

@@ -25,7 +25,7 @@ from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs, collocates
 from mdstopo.scene.modes import Modes
 from mdstopo.scene.origin import extent_of, origin_of, seen_from, starting_places
-from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
+from mdstopo.scene.refusals import BY_PARAMETERS, no_derivatives, refusals
 from mdstopo.sensitivity.springs_driver import SPRINGS, SpringsDriver
 from mdstopo.status import Status
 from mdstopo.warm import Beside
@@ -142,7 +142,7 @@ class Evaluator:
         method = sensitivity or self.sensitivity
         if gradient and self.case.variables and method not in BY_PARAMETERS:
             raise CaseError(
-                [self.case.marks.mistake("design.variables", no_parameters(method))],
+                [self.case.marks.mistake(*no_derivatives(self.case, method))],
                 str(self.case.path or self.case.name),
             )
         if method == "iterative" and self._gives_way:
@@ -409,7 +409,7 @@ class Evaluator:
                 slopes[name] = slope
         constraints, rows = self._design.excess.copy(), self._rows
         limits: dict[int, tuple[Peak, ...]] = {}
-        if self._limited:
+        if self._limited or self._design.moving:
             rows = rows.copy()
             for i, key in self._limited.items():
                 limits[i] = looked[key]

@@ -49,11 +49,12 @@ class Objective(Value):
 
 @frozen
 class Variable(Value):
-    """A parameter of laws that the optimiser varies.
+    """A parameter of laws that the optimiser varies, or a coordinate of points.
 
-    groups: whose; laws: in each of them the place of the law. each: group | member; count: how many values it has, one
-    or as many as a group has members. initial, lower, upper in the parameter's unit; cost: what one unit of each value
-    adds to volume rows that cover any of the groups.
+    groups: whose; laws: in each of them the place of the law. each: group | member | point; count: how many values it
+    has, one or as many as a group has members or a grid points. initial, lower, upper in the parameter's unit; initial
+    of points is an array (count,). cost: what one unit of each value adds to volume rows that cover any of the groups.
+    points: the grid whose points' coordinates along one axis the values are; empty for a parameter.
     """
 
     name: str
@@ -62,11 +63,22 @@ class Variable(Value):
     parameter: str
     each: str
     count: int
-    initial: float
+    initial: float | FloatArray
     lower: float
     upper: float
     cost: float = 0.0
     unit: str = ""
+    points: str = ""
+
+    @property
+    def initials(self) -> FloatArray:
+        """(count,) the initial values."""
+        return np.full(self.count, self.initial)
+
+    @property
+    def of(self) -> str:
+        """What varies, in words."""
+        return f"points {self.points}" if self.points else f"{self.parameter} of {', '.join(self.groups)}"
 
 
 @frozen

@@ -10,6 +10,7 @@ import numpy as np
 
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.candidates import coefficients_of
+from mdstopo.case.catalogue import with_catalogue
 from mdstopo.case.design_variables import prices
 from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
@@ -55,7 +56,13 @@ def apply_design(top: Fields, groups: dict[str, MemberGroup], reading: Reading) 
         good &= _check_numbers(values, name, design, reading)
     if not good:
         return None
-    return {name: replace(group, **numbers.get(name, {})) for name, group in groups.items()}
+    designed = {name: replace(group, **numbers.get(name, {})) for name, group in groups.items()}
+    chosen = with_catalogue(top, designed, reading)
+    if chosen is None:
+        return None
+    for name, (sizes, prices_of_sizes) in chosen.items():
+        designed[name] = replace(designed[name], sizes=sizes, prices=prices_of_sizes)
+    return designed
 
 
 def _for_group(stated: Any, group: str, key: str) -> Any:
@@ -163,10 +170,21 @@ def build_constraints(
             volume = _volume_row(fields, sense, top, groups, variables, reading)
             if volume is not None:
                 built.append(volume)
-                volumes.append((inside(fields.path, sense or ""), volume))
+                if not _lengths_vary(volume, groups, variables):
+                    volumes.append((inside(fields.path, sense or ""), volume))
     if groups is not None:
         check_feasible(volumes, [group for group in groups.values() if group.design], variables, reading)
     return tuple(built)
+
+
+def _lengths_vary(row: VolumeRow, groups: dict[str, MemberGroup] | None, variables: tuple[Variable, ...]) -> bool:
+    """Whether members that a row sums up cost a length that varies: then what it comes to is not known here."""
+    moving = {each.points for each in variables if each.points}
+    return any(
+        groups[name].cost_by_length and bool(moving & {groups[name].from_points, groups[name].to_points})
+        for name in row.groups
+        if groups is not None and name in groups
+    )
 
 
 def _response_row(

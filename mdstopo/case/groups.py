@@ -25,10 +25,13 @@ PRICED = "priced"
 
 @frozen
 class _End(Value):
+    """The points at one end. text: what they are called; grid: their name, empty for a point in place."""
+
     body: str
     local: FloatArray
     world: FloatArray
     text: str
+    grid: str
 
 
 @frozen
@@ -149,6 +152,9 @@ def _build_group(
         laws,
         cost,
         fields["design"],
+        from_points=first.grid,
+        to_points=second.grid,
+        cost_by_length=fields["cost"] == "length",
     )
 
 
@@ -224,6 +230,9 @@ def _priced_group(
         np.zeros(0),
         True,
         candidates=Candidates(count, shortest, longest, cost),
+        from_points=first.grid,
+        to_points=second.grid,
+        cost_by_length=cost is None,
     )
 
 
@@ -231,14 +240,14 @@ def _end(fields: Fields, key: str, points: dict[str, PointGrid], frames: Frames,
     end = fields[key]
     if isinstance(end, str):
         grid = points.get(end)
-        return None if grid is None else _End(grid.body, grid.local, grid.world, end)
+        return None if grid is None else _End(grid.body, grid.local, grid.world, end, end)
     if end is BAD or not end.good() or end["body"] not in frames.bodies:
         return None
     local = frames.local_point(end["body"], end["at"], end["frame"], inside(end.path, "at"), reading)
     if local is BAD:
         return None
     _, world = frames.point(end["body"], end["at"], end["frame"])
-    return _End(end["body"], np.array([local]), np.array([world]), "the point")
+    return _End(end["body"], np.array([local]), np.array([world]), "the point", "")
 
 
 def _connect(

@@ -64,6 +64,7 @@ from mdstopo.case.parts import (
     LoadCase,
     MemberGroup,
     Motion,
+    MovablePoints,
     PointGrid,
     Prescribed,
     PrescribedRotation,
@@ -108,6 +109,7 @@ __all__ = [
     "Marks",
     "MemberGroup",
     "Motion",
+    "MovablePoints",
     "Objective",
     "OptimizerSettings",
     "Pair",
@@ -144,8 +146,9 @@ class Case(Value):
     files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
     the user should know. uncertainty: None where all is certain; the other fields are the nominal case. shared: groups
     whose members have one alpha; mirrored: groups whose members k have one; variables: parameters of laws that are
-    varied. fit: what `mdstopo fit` estimates. dimension: 2 in the plane; 3 in space, where bodies are `SpatialBody`,
-    joints `SpatialJoint` and contacts `SurfaceContact`.
+    varied, then coordinates of points; movable: the points whose these are. fit: what `mdstopo fit` estimates.
+    dimension: 2 in the plane; 3 in space, where bodies are `SpatialBody`, joints `SpatialJoint` and contacts
+    `SurfaceContact`.
     """
 
     title: str
@@ -175,6 +178,7 @@ class Case(Value):
     contacts: tuple[AnyContact, ...] = ()
     dimension: int = 2
     fit: Fit | None = None
+    movable: tuple[MovablePoints, ...] = ()
 
     def __repr__(self) -> str:
         parts = [counted(len(self.bodies), "body"), f"{counted(self.n_members, 'member')}, {self.n_design:,} designed"]
@@ -230,7 +234,7 @@ class Case(Value):
     @property
     def start(self) -> FloatArray:
         """(N + P,) the initial design: alpha, then the values of variables."""
-        values = [np.full(each.count, each.initial) for each in self.variables]
+        values = [each.initials for each in self.variables]
         return read_only(np.concatenate([self.initial, *values])) if values else self.initial
 
     @property

@@ -102,6 +102,26 @@ class PointGrid(Value):
 
 
 @frozen
+class MovablePoints(Value):
+    """The points of a grid whose coordinates are design variables.
+
+    grid, body: their names. base (n, d), or (1, d) where it is the same for all, axes (k, d): in body coordinates a
+    point is its base + its k values . axes; the axes are unit vectors, perpendicular to each other. variables: the name
+    of each axis' variable, which has a value for every point, in their order.
+    """
+
+    grid: str
+    body: str
+    base: FloatArray
+    axes: FloatArray
+    variables: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("base", "axes"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+@frozen
 class Candidates(Value):
     """Members that are priced instead of built: every P with every Q, of an initial length between two limits.
 
@@ -131,6 +151,9 @@ class MemberGroup(Value):
     initial, lower, upper, power: the design's numbers for this group (power is mu of Eq. 12).
     powers: where an optimisation goes from one power to the next: all of them, the last one being `power`.
     candidates: of a priced group all that could be members, of which the M are those that have been built; else None.
+    from_points, to_points: the names of the point grids that P and Q are; empty for a point in place.
+    cost_by_length: whether V_i is the initial length. sizes: what alpha can be in the end, rising; any, where there are
+    none; prices: what stands in volume rows for each of them in the place of alpha.
     """
 
     name: str
@@ -152,6 +175,11 @@ class MemberGroup(Value):
     power: float = 1.0
     powers: tuple[float, ...] = ()
     candidates: Candidates | None = None
+    from_points: str = ""
+    to_points: str = ""
+    cost_by_length: bool = False
+    sizes: tuple[float, ...] = ()
+    prices: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("from_local", "to_local", "from_world", "to_world", "length", "cost"):

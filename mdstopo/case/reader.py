@@ -27,6 +27,7 @@ from mdstopo.case.links import build_bushings, build_joints, declare_joints
 from mdstopo.case.loading import build_load_cases, windows
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.motions import build_motions, merged, resolve_starts, start_angle
+from mdstopo.case.movable import build_movable
 from mdstopo.case.nodes import MAPPING, Node, YamlSyntaxError, parse
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reading import BAD, Fields, Reading, found
@@ -159,6 +160,8 @@ def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dic
     groups = designed if complete or top["members"] is None else None
     motions = {case: build_motions(by_body, geometry) for case, by_body in by_case.items()}
     variables = build_variables(top, groups, reading)
+    movable, coordinates = build_movable(top, points, groups, frames, reading)
+    variables += coordinates
     warn_assemble(top, reading)
     load_cases = build_load_cases(top, times, motions, starts, frames, reading)
     return {
@@ -175,6 +178,7 @@ def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dic
         "optimizer": build_optimizer(top["optimizer"], reading),
         "solver": build_solver(top["solver"], times, reading),
         "variables": variables,
+        "movable": movable,
         "dimension": geometry.number,
         "fit": _fit(top, root, frames, reading),
         **build_shared(top, groups, reading),

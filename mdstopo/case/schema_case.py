@@ -77,6 +77,22 @@ _POWER = Key(
 )
 
 
+_SIZES = ListOf(Number(minimum=0, maximum=1), 1, "sizes")
+_CATALOGUE = Record(
+    "a catalogue",
+    (
+        Key("sizes", _SIZES, "what alpha of a member can be, rising; 0 is no member", required=True),
+        Key(
+            "prices",
+            ListOf(NOT_NEGATIVE, 1, "prices"),
+            "of each size what volume rows have in the place of alpha",
+            otherwise="the sizes themselves",
+        ),
+    ),
+    doc="Sizes that members can be bought in.",
+)
+
+
 @frozen
 class ParameterWord(OpenWord):
     """A number of a law; those of formulas are called as the case calls them."""
@@ -147,6 +163,17 @@ DESIGN = Record(
             default=(),
         ),
         Key("variables", Named(_VARIABLE, "design variable"), "parameters of laws that vary, by name"),
+        Key(
+            "catalogue",
+            ByName(
+                "member group",
+                ByShape("a list of sizes or {sizes, prices}", sequence=_SIZES, mapping=_CATALOGUE),
+                "sizes",
+            ),
+            "sizes that members have in the end: {group: list of sizes, or sizes and prices}; `run` chooses after the "
+            "optimum",
+            otherwise="any size between the bounds",
+        ),
     ),
     doc="The design variables: alpha, one for each member with `design: true`, and parameters of laws. In `initial`, "
     "`lower`, `upper` and `power` groups left out have the default.",

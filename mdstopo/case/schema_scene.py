@@ -25,6 +25,7 @@ from mdstopo.case.laws.law import record_of as record_of_law
 from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByShape, Key, ListOf, Record, Tagged, Vector
 from mdstopo.case.schema_frame import FRAME, FRAMES
+from mdstopo.case.schema_movable import MOVABLE
 from mdstopo.case.schema_outline import OUTLINE
 
 COUNT = Number(minimum=1, whole=True)
@@ -207,6 +208,7 @@ POINTS = Record(
             "where the points are: one grid, or a list whose points follow each other",
             required=True,
         ),
+        MOVABLE,
     ),
     doc="Named points on one body, where members may be fixed.",
 )

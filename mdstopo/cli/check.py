@@ -75,7 +75,10 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
             if case.priced_groups
             else {}
         ),
-        "variables": {each.name: {"values": each.count, "initial": each.initial} for each in case.variables},
+        "variables": {
+            each.name: {"values": each.count, "initial": each.initials.tolist() if each.points else each.initial}
+            for each in case.variables
+        },
         **({"stages": stages} if stages else {}),
         **({"fit": [each.key for each in case.fit.numbers]} if case.fit is not None else {}),
         "totals": {name: {"value": value, "unit": unit} for name, value, unit in sums},
@@ -247,14 +250,20 @@ def _say_variables(output: Output, case: "Case") -> None:
         output.say(f"{case.space.size - case.space.length + case.n_design} different alphas; {'; '.join(together)}")
     if not case.variables:
         return
-    output.say(f"{case.space.length - case.n_design} values of laws that vary")
+    from mdstopo.cli.show import values_text
+
+    what = "coordinates of points" if all(each.points for each in case.variables) else "values of laws"
+    if case.movable and what == "values of laws":
+        what += " and coordinates of points"
+    output.say(f"{case.space.length - case.n_design} {what} that vary")
     rows = [["variable", "of", "values", "initial", "lower", "upper", "unit", "cost"]]
     for each in case.variables:
-        numbers = (number(value) for value in (each.initial, each.lower, each.upper))
-        rows.append(
-            [each.name, f"{each.parameter} of {', '.join(each.groups)}", str(each.count), *numbers, each.unit,
-             number(each.cost)]
-        )  # fmt: skip
+        numbers = (
+            values_text(each.initials) if each.points else number(float(each.initial)),
+            number(each.lower),
+            number(each.upper),
+        )
+        rows.append([each.name, each.of, str(each.count), *numbers, each.unit, number(each.cost)])
     output.table(rows)
 
 

@@ -142,11 +142,11 @@ def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str,
     """The case as the methods need it; raises CaseError where they cannot be applied."""
     from mdstopo.case.errors import CaseError
     from mdstopo.case.integrators import AUTO, FIXED, having
-    from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters
+    from mdstopo.scene.refusals import BY_PARAMETERS, no_derivatives
 
     refused = [method for method in methods if method not in BY_PARAMETERS]
     if case.variables and refused:
-        raise CaseError([case.marks.mistake("design.variables", no_parameters(refused[0]))], str(case_path))
+        raise CaseError([case.marks.mistake(*no_derivatives(case, refused[0]))], str(case_path))
     if not case.is_optimizable:
         key = "members" if case.objectives else "objectives"
         words = "a gradient needs at least one objective and one design variable"

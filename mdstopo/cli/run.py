@@ -29,7 +29,7 @@ from mdstopo.cli.uncertain_numbers import document_of, lines_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mdstopo.session.outcome import Outcome
+    from mdstopo.session.outcome import ChosenSizes, Outcome
 
 _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is neither there nor gone
 
@@ -225,6 +225,8 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     from mdstopo.case.units import words
     from mdstopo.case.words import count_text
     from mdstopo.cli.show import values_text
+    from mdstopo.scene.moving_volumes import spent
+    from mdstopo.session.sizes import at_prices
 
     case, lines = outcome.case, []
     for i, (row, excess) in enumerate(zip(case.constraints, outcome.constraints.tolist(), strict=True)):
@@ -235,7 +237,9 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
             lines.append((f"{row.over_time} {words(row.response)}{where}", found))
             lines += [(title, sentence) for title, sentence in lines_of(outcome.conclusion, f"constraints[{i}]")]
         else:
-            used = row.spent(np.concatenate([outcome.alpha, *outcome.variables.values()]))
+            design = np.concatenate([outcome.alpha, *outcome.variables.values()])
+            chosen = outcome.sizes is not None and bool(outcome.sizes.sizes)
+            used = row.spent(at_prices(case, design)) if chosen else spent(case, row, design)
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))
     width = case.upper - case.lower
@@ -251,7 +255,28 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
         best, together = number(outcome.pricing.best, 2), number(outcome.pricing.together, 2)
         gain = f"gain to first order, relative: {best} by the best one, {together} by all at most"
         lines.append(("candidates", f"{count_text(outcome.pricing.candidates)}, {rounds}; {gain}"))
+    if outcome.sizes is not None:
+        lines += _sizes(outcome.sizes)
     lines += [(each.name, f"{values_text(outcome.variables[each.name])} {each.unit}") for each in case.variables]
+    return lines
+
+
+def _sizes(chosen: "ChosenSizes") -> list[tuple[str, str]]:
+    """What has been chosen from a catalogue, and what is known of it."""
+    from mdstopo.case.words import count_text
+
+    lines = [
+        (f"sizes of {name}", ", ".join(f"{count} of {number(size)}" for size, count in sizes.items()))
+        for name, sizes in chosen.sizes.items()
+    ]
+    how = "all evaluated" if chosen.exhaustive else f"{chosen.nodes} nodes"
+    found = (
+        f"{chosen.members} members kept, {count_text(chosen.choices)} choices; {how}, {chosen.evaluations} evaluations"
+    )
+    lines.append(("  choice", found + ("; found beside the best of the nodes" if chosen.exchanged else "")))
+    if chosen.sizes:
+        value, before = number(chosen.objective, 9), number(chosen.continuous, 9)
+        lines.append(("  continuous", f"{before}, with sizes {value}; best open relaxation {number(chosen.bound, 9)}"))
     return lines
 
 
@@ -291,6 +316,7 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         "compile_seconds": outcome.compile_seconds,
         "uncertainty": document_of(outcome.conclusion),
         **({"pricing": asdict(outcome.pricing)} if outcome.pricing is not None else {}),
+        **({"sizes": asdict(outcome.sizes)} if outcome.sizes is not None else {}),
         "warnings": outcome.warnings,
         "path": str(path),
         "resume": again if outcome.status == "interrupted" else None,

@@ -91,7 +91,7 @@ def final_content(
             final["design"] = _design(case, names) if any(names) else None
         elif key == "points":
             used = _used_points(content, members)
-            final[key] = {name: grid for name, grid in (value or {}).items() if name in used}
+            final[key] = {name: _grid(case, name, grid) for name, grid in (value or {}).items() if name in used}
         elif key == "objectives":
             final[key] = _objectives(value or {}, groups, told)
             final["combine"] = _combine(content.get("combine"), final[key])
@@ -219,6 +219,15 @@ def _design(case: Case, names: Sequence[str]) -> Plain:
     """alpha = 1, fixed there: members stay design members, so that energies and volumes count them."""
     powers = {name: mu for name, mu in zip(names, case.power.tolist(), strict=True) if name and mu != 1.0}
     return {"initial": 1, "lower": 1, "upper": 1, **({"power": powers} if powers else {})}
+
+
+def _grid(case: Case, name: str, stated: Plain) -> Plain:
+    """A point grid as the file states it; where its points could move, a list of where they have come to."""
+    if stated.get("movable") is None:
+        return stated
+    points = case.points[name].local if stated.get("frame", "global") == "body" else case.points[name].world
+    kept = {key: value for key, value in stated.items() if key != "movable"}
+    return {**kept, "grid": {"list": points.tolist()}}
 
 
 def _used_points(content: Plain, members: Plain) -> set[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray, IndexArray
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.movable import with_points_fixed
 from mdstopo.case.reader import read_case
 from mdstopo.case.yaml_text import text_of
 from mdstopo.evaluators import make_engine
@@ -90,7 +91,8 @@ def opened(
 ) -> tuple[Case, FloatArray]:
     """The case of a run, with further keys set, and its best design (N + P,), alphas that are one made so.
 
-    Raises CaseError and StoreError.
+    Points that were design variables stay where the design has them, and are none any more. Raises CaseError and
+    StoreError.
     """
     if view.kind != "run":
         raise StoreError(f"{view.path}: a result of `{view.kind}`; finalize takes one of `run`")
@@ -113,7 +115,7 @@ def opened(
     if words := unshared(case, design):
         notify(words)
         design = np.concatenate([space.expand(space.reduce(design))[: case.n_design], design[case.n_design :]])
-    return case, design
+    return with_points_fixed(case, design)
 
 
 def ready(case: Case, design: FloatArray, keep: int | None, threshold: float | None) -> tuple[IndexArray, Case]:

@@ -221,7 +221,18 @@ class _Lift:
         del path
         frame, grid = _frame(old), old["grid"]
         lift = self.grid
-        return {**old, "grid": [lift(each, frame) for each in grid] if isinstance(grid, list) else lift(grid, frame)}
+        new = {**old, "grid": [lift(each, frame) for each in grid] if isinstance(grid, list) else lift(grid, frame)}
+        if old.get("movable") is not None:
+            new["movable"] = {"within": self.region(old["movable"]["within"], frame)}
+        return new
+
+    def region(self, old: Plain, frame: str) -> Plain:
+        """Where points may move: a line or a rectangle of the plane."""
+        ((kind, keys),) = old.items()
+        if kind == "line":
+            return {kind: {end: self.vector(keys[end], frame) for end in ("from", "to")}}
+        axes = [self.vector([1, 0], frame), self.vector([0, 1], frame)]
+        return {kind: {**keys, "center": self.vector(keys["center"], frame), "axes": axes}}
 
     def grid(self, old: Plain, frame: str) -> Plain:
         """One grid; a lattice in a tilted plane becomes a part of that."""

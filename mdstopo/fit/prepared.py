@@ -46,6 +46,7 @@ def prepared(case: Case) -> Case:
         constraints=(),
         uncertainty=None,
         variables=(),
+        movable=(),
     )
 
 
@@ -55,7 +56,7 @@ def _settled(case: Case, group: MemberGroup) -> MemberGroup:
     for variable in case.variables:
         for name, place in zip(variable.groups, variable.laws, strict=True):
             if name == group.name:
-                laws[place] = replace(laws[place], **{variable.parameter: variable.initial})
+                laws[place] = replace(laws[place], **{variable.parameter: float(variable.initial)})
     return replace(group, laws=tuple(laws))
 
 

@@ -14,7 +14,15 @@ from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in
 from mdstopo.general.drives import drives, drives_all, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel
-from mdstopo.general.variables import adds_damping, as_computed, each_member, lasting_times, varied, watched_times
+from mdstopo.general.variables import (
+    adds_damping,
+    along,
+    as_computed,
+    each_member,
+    lasting_times,
+    varied,
+    watched_times,
+)
 from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.laws import table as laws
@@ -116,6 +124,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     _refuse_redundant(case, load_case, layout.redundant)
     damped = bodies.turns_couple or _damped(case, responses, reductions)
     by_order_8 = damped or _switches(case)
+    entries = varied(case, members["block"])
     model = GeneralModel(
         free=free, mass=mass, q0=np.tile(bodies.at_home, len(names)), v0=v0, home=home, pair=pair, reach=reach,
         **members, times=times, **loads._asdict(), bushing_pair=bushing_pair, bushing=bushing, driven=driven,
@@ -126,7 +135,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         ), line=layout.line,
         envelope=layout.envelope, product=layout.product, steady=layout.steady,
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
-        varied=varied(case, members["block"]),
+        varied=entries, along=along(entries),
     )  # fmt: skip
     skipped = _skipped(case, load_case, dimension, damped)
     return GeneralScene(

@@ -22,7 +22,9 @@ from mdstopo.general.model import (
     PAIR,
     START,
     VARIED_BLOCK,
+    VARIED_FIRST,
     VARIED_PLACE,
+    VARIED_STOP,
     VARIED_VALUE,
     unpack_general,
 )
@@ -230,6 +232,7 @@ def _parameters_through_step(model, member_state, history, w, column, sets, by_s
     segment = history.index[w, SEGMENT]
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
+    moved = np.empty(pair_freedoms(model))
     width = 4 * n + 1
     members = model.member.shape[1]
     for c in range(members, column.shape[0]):
@@ -245,16 +248,17 @@ def _parameters_through_step(model, member_state, history, w, column, sets, by_s
             if model.varied[e, VARIED_VALUE] != c - members or place > FREE_LENGTH or model.active[segment, k] == 0:
                 continue
             for j in range(history.index[w + 1, FIRST] - o):
-                for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+                for i in range(model.varied[e, VARIED_FIRST], model.varied[e, VARIED_STOP]):
                     slope, _ = parameter_slopes(
-                        model, k, i, place, segment, history.when[o + j], member_state, history.stage_q[o + j],
-                        history.stage_v[o + j], history.stage_a[o + j], row, row_rate,
+                        model, e, i, segment, history.when[o + j], member_state, history.stage_q[o + j],
+                        history.stage_v[o + j], history.stage_a[o + j], row, row_rate, moved,
                     )  # fmt: skip
                     slope *= member_state[SCALE, i]
                     for r in range(pair_freedoms(model)):
                         b = (4 + j) * n + place_in_pair(model, model.block[k, PAIR], r)
+                        force = slope * row[r] + member_state[SCALE, i] * moved[r]
                         for d in range(width):
-                            spare[d] -= slope * row[r] * matrix[b, d]
+                            spare[d] -= force * matrix[b, d]
         for m in range(sets.shape[0]):
             for d in range(width):
                 spare[d] += sets[m, c] * by_set[m, d]
@@ -494,6 +498,7 @@ def number_forces(model, ints, shifted, apart, member_state, history, w, c, forc
     segment = history.index[w, SEGMENT]
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
+    moved = np.empty(pair_freedoms(model))
     force[:] = 0.0
     for e in range(model.varied.shape[0]):
         k = model.varied[e, VARIED_BLOCK]
@@ -501,14 +506,14 @@ def number_forces(model, ints, shifted, apart, member_state, history, w, c, forc
         if model.varied[e, VARIED_VALUE] != c or place > FREE_LENGTH or model.active[segment, k] == 0:
             continue
         for j in range(force.shape[0]):
-            for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+            for i in range(model.varied[e, VARIED_FIRST], model.varied[e, VARIED_STOP]):
                 by_value, _ = parameter_slopes(
-                    model, k, i, place, segment, history.when[o + j], member_state, history.stage_q[o + j],
-                    history.stage_v[o + j], history.stage_a[o + j], row, row_rate,
+                    model, e, i, segment, history.when[o + j], member_state, history.stage_q[o + j],
+                    history.stage_v[o + j], history.stage_a[o + j], row, row_rate, moved,
                 )  # fmt: skip
                 for r in range(pair_freedoms(model)):
                     d = place_in_pair(model, model.block[k, PAIR], r)
-                    force[j, d] -= by_value * member_state[SCALE, i] * row[r]
+                    force[j, d] -= by_value * member_state[SCALE, i] * row[r] + member_state[SCALE, i] * moved[r]
     b = c - values_of(model)
     if b < 0:
         return

@@ -35,8 +35,13 @@ PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP, OFFSET, ROW = range(9)
 JOINT_CODE, JOINT_FIRST, JOINT_SECOND, JOINT_PAIR, JOINT_ROWS = range(5)
 #: columns of `GeneralModel.response`: what is looked at, body and reference, component, order in time, group or joint
 KIND, BODY, REFERENCE, COMPONENT, ORDER, SUBJECT = range(6)
-#: columns of `GeneralModel.varied`: the block, the parameter's place in its law, which value, whether a time at an end
-VARIED_BLOCK, VARIED_PLACE, VARIED_VALUE, VARIED_END = range(4)
+#: columns of `GeneralModel.varied`: the block, the parameter's place in its law or the end that moves, which value,
+#: whether a time at an end, and the members (padded) from the first to the one behind the last
+VARIED_BLOCK, VARIED_PLACE, VARIED_VALUE, VARIED_END, VARIED_FIRST, VARIED_STOP, VARIED_COLUMNS = range(7)
+#: what stands in the place of a parameter's place where an end of a member moves, on the pair's first or second body
+FIRST_END, SECOND_END = -1, -2
+#: the column of `GeneralModel.along` behind the direction
+ALONG_FREE_LENGTH = -1
 #: rows of `GeneralModel.member` behind the ends in body frames (counted from the last)
 MEMBER_FREE_LENGTH, MEMBER_EXCESS = -2, -1
 #: the law code of an inerter, which is no function of elongation and rate
@@ -154,9 +159,18 @@ class GeneralModel(NamedTuple):
     varied: Annotated[
         IndexArray,
         Field(
-            "n_varied, 4",
-            "parameters that vary: block, place (`mechanics.laws.table`), which value, and whether it is a time that "
-            "stands exactly at the start (the end); rising by value",
+            "n_varied, 6",
+            "parameters that vary: block, place (`mechanics.laws.table`), which value, whether it is a time that "
+            "stands exactly at the start (the end), and the members; ends that move (FIRST_END, SECOND_END); rising by "
+            "value",
+        ),
+    ]
+    along: Annotated[
+        FloatArray,
+        Field(
+            "n_varied, n_along",
+            "of an end that moves by its value: the direction, in the axes of its body that points have here, and by "
+            "how much the free length grows (m per m)",
         ),
     ]
 

@@ -1,12 +1,19 @@
-"""Derivatives by the laws' own parameters: what they add to the balance, at events, and where a law begins or ends.
+"""Derivatives by the laws' own parameters and by members' ends: what they add to the balance, at events, and where a
+law begins or ends.
 
 A parameter p of a law with force s f(Delta, dDelta/dt, t; p), s = alpha^mu, stands in the balance as
 
     d(M a + Phi_q^T lam - F)/dp = sum B^T s f_p,
 
 so it is differentiated as s is, with s f_p in place of f (an inerter's f_p is d2Delta/dt2, a free length's -f_Delta).
-Energy adds s V_p. Where a member switches at a margin m(Delta, dDelta/dt; p) = 0, the time of the event varies by
--m_p dp/m' besides (`events`), with the saltation dv+ = (a- - a+) dt_e that follows from it.
+Energy adds s V_p. Where an end of a member moves in its body, Delta, dDelta/dt and B change at a fixed motion, so that
+
+    f_p = f_Delta Delta_p + f_d(dDelta/dt)_p,    d(B^T s f)/dp = s (B^T f_p + B_p^T f),    V_p = V_Delta Delta_p,
+
+and where the free length is the length at the start, Delta_p = L_p - l0_p.
+
+Where a member switches at a margin m(Delta, dDelta/dt; p) = 0, the time of the event varies by -m_p dp/m' besides
+(`events`), with the saltation dv+ = (a- - a+) dt_e that follows from it.
 
 A law that begins to act at tau (`active_from`) is a jump of the right side of the motion at a time that is given. Shift
 tau by dtau: before it the motion is as it was, during dtau it goes on without the law, so behind it
@@ -24,31 +31,34 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.events import block_of
 from mdstopo.general.members import MODE, SCALE, SET, level_of, rate_of_row
 from mdstopo.general.model import (
+    ALONG_FREE_LENGTH,
     CODE,
-    COUNT,
     DESIGN,
     GROUP,
     INERTER,
     MEMBER_FREE_LENGTH,
     OFFSET,
     PAIR,
+    SECOND_END,
     START,
     VARIED_BLOCK,
     VARIED_END,
+    VARIED_FIRST,
     VARIED_PLACE,
+    VARIED_STOP,
     VARIED_VALUE,
 )
 from mdstopo.general.responses import value_at
 from mdstopo.general.step_history import EVENTS, GIVEN, MEMBER, OLD, SEGMENT, SET_BEFORE, STATE, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_pair
-from mdstopo.mechanics.kinematics.kinematics_interface import inerter_row, member_rows
+from mdstopo.mechanics.kinematics.kinematics_interface import end_slopes, inerter_row, member_rows
 from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     ACTIVE_UNTIL,
     FREE_LENGTH,
+    law,
     law_has_pieces,
     law_margin_by_time,
     law_margin_slope,
@@ -58,14 +68,12 @@ from mdstopo.mechanics.laws.table import (
 
 
 @kernel
-def parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate):
-    """Derivatives of the force and energy of one member, at unit strength, by a parameter of its law.
+def parameter_slopes(model, e, i, segment, t, member_state, q, v, a, row, row_rate, moved):
+    """Derivatives of the force and energy of one member, at unit strength, by entry e of `varied`.
 
     Constant:
       model: the compiled scene.
-      k: the block of the member.
-      i: number of the member (padded).
-      place: which parameter, as a place of the law's row, or FREE_LENGTH.
+      e, i: the entry, and the member (padded).
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
@@ -74,17 +82,17 @@ def parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row,
     Out:
       row (2 D,): slopes dDelta/dq by the coordinates of the two bodies (m/m, m/rad).
       row_rate (2 D,): their rates in time; of inerters untouched.
+      moved (2 D,): the force times the derivative of row; zero but where an end moves.
 
     Returns df/dp and dV/dp (N and J per unit of the parameter).
     """
+    k = model.varied[e, VARIED_BLOCK]
+    place = model.varied[e, VARIED_PLACE]
+    if place < 0:
+        return end_forces(model, e, i, segment, t, member_state, q, v, a, row, row_rate, moved)
+    moved[:] = 0.0
     if model.block[k, CODE] == INERTER:
-        p = model.block[k, PAIR]
-        bias = np.empty(1)
-        inerter_row(model, q, v, i, p, row, bias)
-        value = bias[0]
-        for r in range(pair_freedoms(model)):
-            value += row[r] * a[place_in_pair(model, p, r)]
-        return value, 0.0
+        return inerter_second_rate(model, k, i, q, v, a, row), 0.0
     x, rate = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
     x -= member_state[SET, i]
     level = level_of(model, segment, k, t)
@@ -92,6 +100,73 @@ def parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row,
         model.block[k, CODE], model.law[k], place, x, rate, int(member_state[MODE, i]), t, level, model.curves,
         model.member[MEMBER_FREE_LENGTH, i],
     )  # fmt: skip
+
+
+@kernel
+def inerter_second_rate(model, k, i, q, v, a, row):
+    """d2Delta/dt2 of an inerter (m/s^2).
+
+    Constant:
+      model: the compiled scene.
+      k, i: the block, and the member (padded).
+    In:
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      row (2 D,): its B.
+    """
+    p = model.block[k, PAIR]
+    bias = np.empty(1)
+    inerter_row(model, q, v, i, p, row, bias)
+    value = bias[0]
+    for r in range(pair_freedoms(model)):
+        value += row[r] * a[place_in_pair(model, p, r)]
+    return value
+
+
+@kernel
+def end_forces(model, e, i, segment, t, member_state, q, v, a, row, row_rate, moved):
+    """`parameter_slopes` where an entry is an end of the member that moves.
+
+    Constant:
+      model: the compiled scene.
+      e, i: the entry, and the member (padded).
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      row, row_rate (2 D,): as there.
+      moved (2 D,): the force times the derivative of row.
+    """
+    k = model.varied[e, VARIED_BLOCK]
+    side = 1 if model.varied[e, VARIED_PLACE] == SECOND_END else 0
+    p = model.block[k, PAIR]
+    by_length, by_rate, by_second, second = end_slopes(model, p, i, side, model.along[e], q, v, a, moved)
+    if model.block[k, CODE] == INERTER:
+        inerter_second_rate(model, k, i, q, v, a, row)
+        for r in range(moved.shape[0]):
+            moved[r] *= model.law[k, 0] * second
+        return model.law[k, 0] * by_second, 0.0
+    x, rate = member_rows(model, p, i, q, v, row, row_rate)
+    x -= member_state[SET, i]
+    level = level_of(model, segment, k, t)
+    code = model.block[k, CODE]
+    mode = int(member_state[MODE, i])
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    f, f_x, f_rate, _, pull = law(code, model.law[k], x, rate, mode, t, level, model.curves, rest)
+    by_force = f_x * by_length + f_rate * by_rate
+    by_energy = pull * by_length
+    grows = model.along[e, ALONG_FREE_LENGTH]
+    if grows != 0.0:
+        by_rest, energy_by_rest = law_slopes(
+            code, model.law[k], FREE_LENGTH, x, rate, mode, t, level, model.curves, rest
+        )
+        by_force += grows * by_rest
+        by_energy += grows * energy_by_rest
+    for r in range(moved.shape[0]):
+        moved[r] *= f
+    return by_force, by_energy
 
 
 @kernel
@@ -112,18 +187,20 @@ def add_parameters(model, segment, t, member_state, q, v, a, z, weight, out):
     """
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
+    moved = np.empty(pair_freedoms(model))
     members = model.member.shape[1]
     for e in range(model.varied.shape[0]):
         k = model.varied[e, VARIED_BLOCK]
-        place = model.varied[e, VARIED_PLACE]
-        if place > FREE_LENGTH or model.active[segment, k] == 0:
+        if model.varied[e, VARIED_PLACE] > FREE_LENGTH or model.active[segment, k] == 0:
             continue
         own = weight if model.block[k, DESIGN] >= 0 else 0.0
         total = 0.0
-        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
-            by_force, by_energy = parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate)
+        for i in range(model.varied[e, VARIED_FIRST], model.varied[e, VARIED_STOP]):
+            by_force, by_energy = parameter_slopes(model, e, i, segment, t, member_state, q, v, a, row, row_rate, moved)
             pulled = rate_of_row(model, model.block[k, PAIR], row, z)
             total += member_state[SCALE, i] * (own * by_energy - by_force * pulled)
+            if model.varied[e, VARIED_PLACE] < 0:
+                total -= member_state[SCALE, i] * rate_of_row(model, model.block[k, PAIR], moved, z)
         out[members + model.varied[e, VARIED_VALUE]] += total
 
 
@@ -145,16 +222,16 @@ def add_force_parameters(model, segment, group, who, t, member_state, q, v, a, s
     """
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
+    moved = np.empty(pair_freedoms(model))
     members = model.member.shape[1]
     for e in range(model.varied.shape[0]):
         k = model.varied[e, VARIED_BLOCK]
-        place = model.varied[e, VARIED_PLACE]
-        own = who - model.block[k, OFFSET]
-        if place > FREE_LENGTH or model.active[segment, k] == 0 or model.block[k, GROUP] != group:
+        i = who - model.block[k, OFFSET] + model.block[k, START]
+        late = model.varied[e, VARIED_PLACE] > FREE_LENGTH
+        if late or model.active[segment, k] == 0 or model.block[k, GROUP] != group:
             continue
-        if own >= 0 and own < model.block[k, COUNT]:
-            i = model.block[k, START] + own
-            slope, _ = parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate)
+        if i >= model.varied[e, VARIED_FIRST] and i < model.varied[e, VARIED_STOP]:
+            slope, _ = parameter_slopes(model, e, i, segment, t, member_state, q, v, a, row, row_rate, moved)
             out[members + model.varied[e, VARIED_VALUE]] += scale * member_state[SCALE, i] * slope
 
 
@@ -170,7 +247,8 @@ def event_slope(model, history, member_state, event, e):
     state = history.event[event, STATE]
     who = history.event[event, MEMBER]
     given = state == 0 or history.event[event, GIVEN] != 0
-    if place > FREE_LENGTH or given or block_of(model, who) != k or law_has_pieces(model.block[k, CODE]):
+    own = who >= model.varied[e, VARIED_FIRST] and who < model.varied[e, VARIED_STOP]
+    if place > FREE_LENGTH or given or not own or law_has_pieces(model.block[k, CODE]):
         return 0.0
     segment = history.index[state - 1, SEGMENT]
     q = history.q[state]
@@ -184,10 +262,13 @@ def event_slope(model, history, member_state, event, e):
     t = history.t[state]
     rest = model.member[MEMBER_FREE_LENGTH, who]
     by_time = law_margin_by_time(code, model.law[k], x, rate, mode, t, model.curves, rest)
-    by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, t, model.curves, rest)
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
+    if place < 0:
+        by_p = _margin_by_end(model, e, who, q, v, x, rate, mode, t)
+    else:
+        by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, t, model.curves, rest)
     if by_p == 0.0:
         return 0.0
-    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
     speed = by_x * rate + by_time
     if by_rate != 0.0:
         a = np.empty(model.mass.shape[0])
@@ -201,6 +282,28 @@ def event_slope(model, history, member_state, event, e):
             d = place_in_pair(model, model.block[k, PAIR], r)
             speed += by_rate * (row[r] * a[d] + row_rate[r] * v[d])
     return -by_p / speed if speed != 0.0 else 0.0
+
+
+@kernel
+def _margin_by_end(model, e, i, q, v, x, rate, mode, t):
+    """Derivative of the margin of member i by entry e of `varied`, an end that moves (m, or m/s, per m).
+
+    Constant:
+      model: the compiled scene.
+    In:
+      q (n_q,), v (n,): coordinates and velocities.
+      x, rate: elongation, less the permanent set (m), and its rate (m/s).
+      mode, t: the member's mode, and time (s).
+    """
+    k = model.varied[e, VARIED_BLOCK]
+    side = 1 if model.varied[e, VARIED_PLACE] == SECOND_END else 0
+    code = model.block[k, CODE]
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    room = np.empty(pair_freedoms(model))
+    length_by_end, rate_by_end, _, _ = end_slopes(model, model.block[k, PAIR], i, side, model.along[e], q, v, v, room)
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
+    by_rest = law_margin_slope(code, model.law[k], FREE_LENGTH, x, rate, mode, t, model.curves, rest)
+    return by_x * length_by_end + by_rate * rate_by_end + model.along[e, ALONG_FREE_LENGTH] * by_rest
 
 
 @kernel

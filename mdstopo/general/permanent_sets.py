@@ -17,9 +17,10 @@ Sets are counted through the blocks of the law, in their order: slots.
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.model import (
+    ALONG_FREE_LENGTH,
     CODE,
     COUNT,
     DESIGN,
@@ -28,12 +29,15 @@ from mdstopo.general.model import (
     MEMBER_FREE_LENGTH,
     OFFSET,
     PAIR,
+    SECOND_END,
     START,
     STOP,
     SUBJECT,
     VARIED_BLOCK,
     VARIED_END,
+    VARIED_FIRST,
     VARIED_PLACE,
+    VARIED_STOP,
     VARIED_VALUE,
 )
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
@@ -51,6 +55,7 @@ from mdstopo.general.step_history import (
 )
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import (
+    end_slopes,
     freedoms,
     member_motion,
     member_rows,
@@ -291,9 +296,18 @@ def time_forward(model, history, e, sets, i):
 
 @kernel
 def own_slope(model, history, e, entry, rate):
-    """Slope of the set that event e has made by the parameter of an entry of `varied`; rate: dDelta/dt there."""
+    """Slope of the set that event e has made by an entry of `varied`; rate: dDelta/dt there."""
     place = model.varied[entry, VARIED_PLACE]
     k = model.varied[entry, VARIED_BLOCK]
+    if place < 0:
+        side = 1 if place == SECOND_END else 0
+        s = history.event[e, STATE]
+        room = np.empty(pair_freedoms(model))
+        by_length, _, _, _ = end_slopes(
+            model, model.block[k, PAIR], history.event[e, MEMBER], side, model.along[entry], history.q[s], history.v[s],
+            history.v[s], room,
+        )  # fmt: skip
+        return by_length - model.along[entry, ALONG_FREE_LENGTH]
     if place <= FREE_LENGTH:
         return law_set_slope(model.block[k, CODE], model.law[k], place)
     if place != ACTIVE_FROM:
@@ -303,6 +317,12 @@ def own_slope(model, history, e, entry, rate):
         model.active[history.index[state - 1, SEGMENT], k] == 0 if state > 0 else model.varied[entry, VARIED_END] != 0
     )
     return rate if begins else 0.0
+
+
+@part
+def varies_member(model, e, i):
+    """Whether entry e of `varied` is about member i (padded)."""
+    return i >= model.varied[e, VARIED_FIRST] and i < model.varied[e, VARIED_STOP]
 
 
 @kernel
@@ -322,7 +342,7 @@ def begins_divided(model, member_state, q, v, near):
         ):
             continue
         p = model.law[k]
-        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+        for i in range(model.varied[e, VARIED_FIRST], model.varied[e, VARIED_STOP]):
             if member_state[SCALE, i] == 0.0:
                 continue
             x, rate = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
@@ -357,7 +377,7 @@ def sets_back(model, history, e, bar, lam_q, out):
     p = model.block[k, PAIR]
     _, rate = member_rows(model, p, history.event[e, MEMBER], history.q[s], history.v[s], row, row_rate)
     for entry in range(model.varied.shape[0]):
-        if model.varied[entry, VARIED_BLOCK] == k:
+        if varies_member(model, entry, history.event[e, MEMBER]):
             own = own_slope(model, history, e, entry, rate)
             out[model.member.shape[1] + model.varied[entry, VARIED_VALUE]] += bar[slot] * own
     for r in range(pair_freedoms(model)):
@@ -409,7 +429,7 @@ def sets_forward(model, history, e, column, sets):
         for r in range(pair_freedoms(model)):
             sets[slot, i] += row[r] * column[i, place_in_pair(model, model.block[k, PAIR], r)]
     for entry in range(model.varied.shape[0]):
-        if model.varied[entry, VARIED_BLOCK] == k:
+        if varies_member(model, entry, history.event[e, MEMBER]):
             sets[slot, model.member.shape[1] + model.varied[entry, VARIED_VALUE]] += own_slope(
                 model, history, e, entry, rate
             )

@@ -10,7 +10,19 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import lanes
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import SCALE, level_of, rate_of_row
-from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, PAIR, START, VARIED_BLOCK, VARIED_PLACE, VARIED_VALUE
+from mdstopo.general.model import (
+    CODE,
+    COUNT,
+    DESIGN,
+    INERTER,
+    PAIR,
+    START,
+    VARIED_BLOCK,
+    VARIED_FIRST,
+    VARIED_PLACE,
+    VARIED_STOP,
+    VARIED_VALUE,
+)
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
@@ -126,20 +138,23 @@ def _add_parameters(model, segment, history, at, member_state, z, j, out):
     """
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
+    moved = np.empty(pair_freedoms(model))
     total = np.empty(out.shape[0])
     members = model.member.shape[1]
     for e in range(model.varied.shape[0]):
         k = model.varied[e, VARIED_BLOCK]
-        place = model.varied[e, VARIED_PLACE]
-        if place > FREE_LENGTH or model.active[segment, k] == 0:
+        if model.varied[e, VARIED_PLACE] > FREE_LENGTH or model.active[segment, k] == 0:
             continue
+        p = model.block[k, PAIR]
         total[:] = 0.0
-        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+        for i in range(model.varied[e, VARIED_FIRST], model.varied[e, VARIED_STOP]):
             slope, _ = parameter_slopes(
-                model, k, i, place, segment, history.when[at], member_state, history.stage_q[at], history.stage_v[at],
-                history.stage_a[at], row, row_rate,
+                model, e, i, segment, history.when[at], member_state, history.stage_q[at], history.stage_v[at],
+                history.stage_a[at], row, row_rate, moved,
             )  # fmt: skip
             for m in range(out.shape[0]):
-                total[m] -= member_state[SCALE, i] * (slope * rate_of_row(model, model.block[k, PAIR], row, z[m, j]))
+                total[m] -= member_state[SCALE, i] * (slope * rate_of_row(model, p, row, z[m, j]))
+                if model.varied[e, VARIED_PLACE] < 0:
+                    total[m] -= member_state[SCALE, i] * rate_of_row(model, p, moved, z[m, j])
         for m in range(out.shape[0]):
             out[m, members + model.varied[e, VARIED_VALUE]] += total[m]

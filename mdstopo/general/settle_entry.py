@@ -15,7 +15,9 @@ from mdstopo.general.model import (
     PAIR,
     START,
     VARIED_BLOCK,
+    VARIED_FIRST,
     VARIED_PLACE,
+    VARIED_STOP,
     VARIED_VALUE,
     unpack_general,
 )
@@ -126,7 +128,7 @@ def unit_forces(ints, floats, alpha, member_state, q, out):
 
 @entry
 def value_forces(ints, floats, alpha, member_state, q, out):
-    """What each value of the laws' variables adds to the forces at rest: -sum s f_p B^T over its members.
+    """What each value of variables adds to the forces at rest: -sum s (f_p B^T + f B_p^T) over its members.
 
     Times at which laws begin or end to act add nothing, nor does what multiplies rates.
 
@@ -145,6 +147,7 @@ def value_forces(ints, floats, alpha, member_state, q, out):
     v = np.zeros(n)
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
+    moved = np.empty(pair_freedoms(model))
     rest(model, alpha, member_state, q, v)
     out[:] = 0.0
     for e in range(model.varied.shape[0]):
@@ -153,8 +156,9 @@ def value_forces(ints, floats, alpha, member_state, q, out):
         if place > FREE_LENGTH or model.active[0, k] == 0 or model.block[k, CODE] == INERTER:
             continue
         p = model.block[k, PAIR]
-        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
-            slope, _ = parameter_slopes(model, k, i, place, start, model.times[0], member_state, q, v, v, row, row_rate)
+        for i in range(model.varied[e, VARIED_FIRST], model.varied[e, VARIED_STOP]):
+            slope, _ = parameter_slopes(model, e, i, start, model.times[0], member_state, q, v, v, row, row_rate, moved)
             slope *= member_state[SCALE, i]
             for r in range(pair_freedoms(model)):
-                out[model.varied[e, VARIED_VALUE], place_in_pair(model, p, r)] -= slope * row[r]
+                force = slope * row[r] + member_state[SCALE, i] * moved[r]
+                out[model.varied[e, VARIED_VALUE], place_in_pair(model, p, r)] -= force

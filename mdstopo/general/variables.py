@@ -1,7 +1,8 @@
-"""Where the design variables of laws stand in a general scene, and the scene's arrays at their values.
+"""Where the design variables of laws and of points stand in a general scene, and the scene's arrays at their values.
 
-Nothing is compiled anew for other values: they are written into the law's row, the free length of members, and, where
-they say when a law acts, into the ends of segments. Which block a value belongs to does not change.
+Nothing is compiled anew for other values: they are written into the law's row, the free length of members, their ends
+(`moved_ends`), and, where they say when a law acts, into the ends of segments. Which block a value belongs to does not
+change.
 """
 
 from dataclasses import replace
@@ -12,7 +13,8 @@ from mdstopo.case.laws.expression import OfFormulas
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Case, Law, LoadCase, MemberGroup, Variable
 from mdstopo.general.kinks import landed
-from mdstopo.general.model import COUNT, GROUP, MEMBER_EXCESS, MEMBER_FREE_LENGTH, START, GeneralModel
+from mdstopo.general.model import COUNT, GROUP, MEMBER_EXCESS, MEMBER_FREE_LENGTH, START, VARIED_COLUMNS, GeneralModel
+from mdstopo.general.moved_ends import WIDTH, MovedEnds, rows_of_ends
 from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -82,9 +84,9 @@ def as_computed(case: Case) -> Case:
 
 
 def varied(case: Case, block: IndexArray) -> IndexArray:
-    """(n_varied, 4): block, place of the parameter, which value, rising; the last column is set by `Placing`."""
+    """(n_varied, 6): `GeneralModel.varied`, of which `Placing` sets the column that tells of times at an end."""
     if not case.variables:
-        return np.zeros((0, 4), dtype=np.int64)
+        return np.zeros((0, VARIED_COLUMNS), dtype=np.int64)
     blocks = _blocks(case, block)
     rows = []
     first = 0
@@ -94,9 +96,16 @@ def varied(case: Case, block: IndexArray) -> IndexArray:
             record = case.members[int(block[own[0], GROUP])].laws[law]
             place = laws.place_of(type(record), variable.parameter)
             for i, k in enumerate(own):
-                rows.append([k, place, first + (i if variable.each == "member" else 0), 0])
+                members = int(block[k, START]), int(block[k, START] + block[k, COUNT])
+                rows.append([k, place, first + (i if variable.each == "member" else 0), 0, *members])
         first += variable.count
-    return np.array(sorted(rows, key=lambda row: row[2]), dtype=np.int64)
+    of_laws = np.array(sorted(rows, key=lambda row: row[2]), dtype=np.int64).reshape(-1, VARIED_COLUMNS)
+    return np.concatenate([of_laws, rows_of_ends(case, blocks, block)])
+
+
+def along(rows: IndexArray) -> FloatArray:
+    """(n_varied, WIDTH): `GeneralModel.along` of entries (n_varied, 6) before any values are known: zeros."""
+    return np.zeros((len(rows), WIDTH))
 
 
 class Placing:
@@ -118,10 +127,13 @@ class Placing:
                     taken = self._taken.setdefault(k, (record, {}))[1]
                     taken[variable.parameter] = first + (i if variable.each == "member" else 0)
             first += variable.count
-        self.initial = np.concatenate([np.full(each.count, each.initial) for each in case.variables])
+        self._ends = MovedEnds(case, load_case, model, blocks) if case.movable else None
+        self.initial = np.concatenate([each.initials for each in case.variables])
 
     def at(self, model: GeneralModel, values: FloatArray) -> GeneralModel:
         """The arrays with values (P,) in them."""
+        if self._ends is not None:
+            model = self._ends.at(model, values)
         law, member = model.law.copy(), model.member.copy()
         start, end = self._load_case.start, self._load_case.end
         times: set[float] = set()

@@ -41,6 +41,10 @@ def bound(case: Case, objective: Objective) -> Bound:
         return Bound(None, "the case has uncertain values: a bound would hold for one sample alone")
     if is_spatial(case):
         return Bound(None, "bounds are known of bodies in a plane alone")
+    if case.movable:
+        return Bound(
+            None, "ends of members are design variables: bounds are known of ends that stay in their body alone"
+        )
     load_case = case.load_case(objective.load_case)
     try:
         if case.solver.assemble and case.joints:

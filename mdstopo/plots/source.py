@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
+from mdstopo.case.movable import placed
 from mdstopo.store.result_reader import ResultView, read_result
 from mdstopo.store.store_errors import DamagedError, StoreError
 from mdstopo.store.stored_case import case_of
@@ -41,7 +42,7 @@ class Source:
             raise StoreError(f"{path}: --point is for fronts; this was made by `{self.view.kind}`")
 
     @cached_property
-    def case(self) -> Case:
+    def stated(self) -> Case:
         """The case as it was read, with what --set changed; of a fit the fitted one, looking at what was measured."""
         case = case_of(self.view)
         if self.view.kind != "fit":
@@ -49,6 +50,13 @@ class Source:
         from mdstopo.fit.record import fitted_case
 
         return fitted_case(self.view, case)
+
+    @cached_property
+    def case(self) -> Case:
+        """The same with points that are design variables where the design that is shown has them."""
+        case, arrays = self.stated, self.view.arrays
+        shown = "design/alpha" in arrays or "pareto/alpha" in arrays
+        return placed(case, self.design) if case.movable and shown else case
 
     @property
     def title(self) -> str:
@@ -86,17 +94,17 @@ class Source:
     def design(self) -> Floats:
         """The design that is shown: alpha, then the values of variables, as far as the file has them."""
         alpha = self.alpha
-        if not self.case.variables:
+        if not self.stated.variables:
             return alpha
         if "design/alpha" in self.view.arrays:
             values = self.view.under("design/variables")
         else:
             found = design_of(self.view, self._shown)
             values = {} if found is None else found[1]
-        for each in self.case.variables:
+        for each in self.stated.variables:
             if each.name not in values:
                 raise DamagedError(f"{self.view.path}: damaged: it has no values of {each.name}")
-        return np.concatenate([alpha, *(values[each.name] for each in self.case.variables)])
+        return np.concatenate([alpha, *(values[each.name] for each in self.stated.variables)])
 
     @property
     def load_cases(self) -> tuple[str, ...]:

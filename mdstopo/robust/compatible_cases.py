@@ -28,6 +28,14 @@ def _members(case: Case, made: Case) -> Iterator[str]:
     if [group.name for group in case.members] != [group.name for group in made.members]:
         yield "groups of members are missing, new, or in another order"
     groups = {group.name: group for group in made.members}
+    moving = {variable.name: variable for variable in made.variables if variable.points}
+    for variable in case.variables:
+        twin = moving.get(variable.name)
+        if variable.points and not (twin and np.array_equal(variable.initials, twin.initials)):
+            yield (
+                f"points {variable.points} are set, but they are movable: the design states {variable.name}, not the "
+                "sample"
+            )
     for variable in case.variables:
         for name, place in zip(variable.groups, variable.laws, strict=True):
             own = next(group for group in case.members if group.name == name)

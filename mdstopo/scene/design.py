@@ -8,6 +8,7 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Case, VolumeRow
 from mdstopo.compiler.jit import vector_entry
+from mdstopo.scene.moving_volumes import moving_volumes
 
 
 class Design:
@@ -17,7 +18,8 @@ class Design:
     evaluation begins with `take`.
 
     values (N + P,): alpha, then the values of the case's variables. rows (n_con, N + P): coefficients of the volume
-    rows, zeros in those of other constraints. excess (n_con,): rows values - bounds.
+    rows, zeros in those of other constraints. excess (n_con,): rows values - bounds. Where members cost a length that
+    varies, a row is the derivative of their sum at the design instead. moving: whether there is such a row.
     """
 
     def __init__(self, case: Case) -> None:
@@ -31,6 +33,8 @@ class Design:
                 self.rows[i, n:] = row.prices if len(row.prices) else 0.0
         self.bounds = np.array([row.bound for row in case.constraints], dtype=np.float64)
         self.excess = np.zeros(count)
+        self._volumes = moving_volumes(case)
+        self.moving = bool(self._volumes)
         self._weigh: Callable[[], Any] | None = None
 
     def take(self, alpha: FloatArray) -> FloatArray:
@@ -43,6 +47,9 @@ class Design:
             self._weigh = weigh.prepare(*arguments)  # type: ignore[attr-defined]
         if self._weigh():
             checked(self._case, values)
+        for i, volume in self._volumes.items():
+            spent, self.rows[i] = volume.at(values)
+            self.excess[i] = spent - self.bounds[i]
         return values
 
 

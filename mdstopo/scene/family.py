@@ -26,7 +26,7 @@ def beyond_springs(case: Case) -> str:
     if any(load_case.motions for load_case in case.load_cases):
         return "prescribed motions"
     if case.variables:
-        return "design variables of laws"
+        return "movable points" if all(each.points for each in case.variables) else "design variables of laws"
     for group in case.members:
         found = _law(group)
         if found:

@@ -127,6 +127,9 @@ def seen_from(case: Case, origin: Point) -> Case:
         constraints=tuple(_looked(row, origin) if isinstance(row, ResponseRow) else row for row in case.constraints),
         joints=tuple(_tie(joint, origin) for joint in case.joints),
         bushings=tuple(_tie(bushing, origin) for bushing in case.bushings),
+        movable=tuple(
+            replace(each, base=each.base - np.array(origin)) if each.body == GROUND else each for each in case.movable
+        ),
     )
 
 

@@ -9,15 +9,20 @@ from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.words import number_text
 from mdstopo.scene.family import beyond_collocation, beyond_springs
+from mdstopo.scene.moving_volumes import moving_volumes
 from mdstopo.settings.optimizers import OPTIMIZERS
 
-#: methods that differentiate by parameters of laws
+#: methods that differentiate by parameters of laws and coordinates of points
 BY_PARAMETERS = frozenset({"auto", "adjoint", "direct"})
 
 
-def no_parameters(method: str) -> str:
-    """Why a method does not go with variables."""
-    return f"{method} gives no derivatives by parameters of laws; adjoint does, and direct"
+def no_derivatives(case: Case, method: str) -> tuple[str, str]:
+    """The place of what a method does not differentiate by, and why it does not go with it."""
+    if all(each.points for each in case.variables):
+        place, what = f"points.{case.movable[0].grid}.movable", "coordinates of points"
+    else:
+        place, what = "design.variables", "parameters of laws"
+    return place, f"{method} gives no derivatives by {what}; adjoint does, and direct"
 
 
 def refusals(case: Case) -> list[Mistake]:
@@ -43,13 +48,14 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
     if kind is not None and not (kind.adaptive or kind.finds_step) and solver.step is None:
         yield "solver.integrator", f"{kind.name} needs a `step`, which is not given"
     optimizer = OPTIMIZERS[case.optimizer.name]
+    moving = moving_volumes(case)
     for i, row in enumerate(case.constraints):
-        volume = isinstance(row, VolumeRow)
+        volume = isinstance(row, VolumeRow) and i not in moving
         if not (optimizer.takes_volumes if volume else optimizer.takes_limits):
-            what = "volumes" if volume else "responses"
+            what = "volumes" if volume else "sums of lengths that vary" if i in moving else "responses"
             yield f"constraints[{i}]", f"the optimiser {optimizer.name} takes no limits on {what}; gsao does"
     if case.variables and solver.sensitivity not in BY_PARAMETERS:
-        yield "solver.sensitivity", no_parameters(solver.sensitivity)
+        yield "solver.sensitivity", no_derivatives(case, solver.sensitivity)[1]
     for group in case.priced_groups:
         yield from _unpriced(case, group)
 

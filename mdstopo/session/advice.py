@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, FloatArray, Objective, ResponseRow, VolumeRow
 from mdstopo.case.responses import kind_of
+from mdstopo.scene.moving_volumes import spent
 from mdstopo.scene.points import seats_at
 from mdstopo.starts.evaluator_interface import Evaluation
 from mdstopo.store.contents import Motion
@@ -31,7 +32,7 @@ def advise(case: Case, design: Floats, before: Mapping[str, Motion], after: Mapp
     soft = any(may_soften(case, name) and not _prescribed(before[name], after[name]) for name in after)
     for row in case.constraints if soft else ():
         if isinstance(row, VolumeRow) and row.sense == "limit" and row.bound > 0.0:
-            share = row.spent(design) / row.bound
+            share = spent(case, row, design) / row.bound
             if share < _USED:
                 found.append(
                     f"only {share:.1%} of the volume limit {row.bound:g} of {', '.join(row.groups)} is used: "

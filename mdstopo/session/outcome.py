@@ -72,6 +72,30 @@ class Pricing:
     together: float
 
 
+@dataclass(frozen=True, slots=True)
+class ChosenSizes:
+    """What is known of the choice of sizes from a catalogue.
+
+    members: how many are kept, whose sizes are chosen; choices: how many there are of these. objective: raw value of
+    the best choice; continuous: that of the optimum before. bound: the best optimum of a relaxation that is still open,
+    or the objective where none is; of a problem with several optima it is no proven bound. nodes, evaluations: so far.
+    exhaustive: whether all choices were evaluated; exchanged: whether a neighbour of the best of all nodes was better
+    still. finished: whether the search has come to its end. sizes: by group, how many members have each.
+    """
+
+    members: int
+    choices: int
+    objective: float
+    continuous: float
+    bound: float
+    nodes: int
+    evaluations: int
+    exhaustive: bool
+    exchanged: bool
+    finished: bool
+    sizes: Mapping[str, Mapping[float, int]]
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Outcome:
     """A run that has ended, or was stopped.
@@ -84,7 +108,8 @@ class Outcome:
     this is. evaluations, iterations: of all starts. seconds: wall time of the iterations in this process;
     compile_seconds: of getting ready, loading or compiling kernels. conclusion: nominal and robust values and the fresh
     sample's, of an uncertain case. variables: the best design's values, by name, in the parameters' units. pricing:
-    what is known of candidates that are priced; case: then with the members that were built in the end.
+    what is known of candidates that are priced; case: then with the members that were built in the end. sizes: what is
+    known of the choice of sizes from a catalogue.
     """
 
     case: Case
@@ -112,6 +137,7 @@ class Outcome:
     conclusion: "Conclusion | None" = None
     variables: Mapping[str, Floats] = field(default_factory=dict)
     pricing: "Pricing | None" = None
+    sizes: "ChosenSizes | None" = None
 
     def __repr__(self) -> str:
         parts = [f"{self.status.value}: {self.reason}"]

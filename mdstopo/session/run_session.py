@@ -27,6 +27,7 @@ from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.pricing_rounds import Rounds
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
+from mdstopo.session.sizes import Sizes
 from mdstopo.session.start_in_stages import (
     ROUND,
     Marked,
@@ -126,6 +127,7 @@ def run_session(
         if initial.shape != (case.space.length,) or not np.isfinite(initial).all():
             raise ValueError(f"initial must be {case.n_design} finite numbers, one for each design variable")
     tell = notify or ignore
+    Sizes(case).refuse()
     run = _Run(case, initial, on_iteration or ignore, stop_requested or never, tell, command)
     if path is None:
         with run.helpers:
@@ -179,6 +181,7 @@ class _Run:
         self.combining = Combining(case)
         #: the rounds in which candidates are priced; the case as it was read, whose members are where they begin
         self.rounds = Rounds(case)
+        self.sizes = Sizes(case)
         self.stated = case
         self.peaks: dict[str, tuple[tuple[float, float], ...]] = {}
         self.conclusion: Conclusion | None = None
@@ -223,6 +226,7 @@ class _Run:
                 problem = self.marked(engine.problem())
                 self.open_round(problem)
                 self.iterate(make, problem, path, workers, None)
+            self.choose_sizes(problem, path)
         ended = time.perf_counter()
         best = best_of(self.case, self.states)
         if best is None:
@@ -240,6 +244,22 @@ class _Run:
         if path is not None:
             self.save(path, status, reason)
         return self.outcome(engine, path, best, status, reason, ended - opened, compiled - began)
+
+    def choose_sizes(self, problem: Problem, path: Path | None) -> None:
+        """Choose sizes from the case's catalogue behind the best optimum, where there is one."""
+        best = best_of(self.case, self.states)
+        state = None if best is None else self.states[best]
+        if not (self.sizes.asked and self.has_ended) or best is None or state is None:
+            return
+        if state.status is RunStatus.FAILED or self.sizes.is_chosen(state):
+            return
+        saver = None if path is None else Checkpointer(lambda: self.checkpoint(path))
+
+        def keep() -> None:
+            if saver is not None:
+                saver.offer()
+
+        self.states[best] = self.sizes.choose(problem, state, self.stop_requested, keep, self.notify)
 
     def marked(self, problem: Problem) -> Problem:
         """The problem, which says which round of pricing it is of, if it is of one."""
@@ -310,6 +330,7 @@ class _Run:
         starts, earlier = self.case.optimizer.starts, int(view.settings.get("starts", 1))
         known = restore(view, starts)
         self.states = carried_over(self.case, known, earlier)
+        self.sizes.restore(view)
         again = [str(k + 1) for k in range(starts) if known[k] is not None and self.states[k] is None]
         if again:
             self.notify(
@@ -409,6 +430,10 @@ class _Run:
         assert state is not None
         if self.case.priced_groups:
             return self.rounds.conclude(state)
+        if ended := self.sizes.conclude(state):
+            return ended
+        if self.sizes.is_chosen(state):
+            return state.status, state.reason
         stage, count = stage_of(state) + 1, stage_count(self.case)
         return state.status, state.reason if stage == count else f"stage {stage} of {count}: {state.reason}"
 
@@ -488,7 +513,7 @@ class _Run:
         visited = np.zeros((0, len(self.case.objectives)))
         if best_of(self.case, self.states) is not None:
             part = run_part(self.case, self.states, self.combining.evaluations, self.final_objectives)
-            datasets |= part
+            datasets |= part | self.sizes.part()
             visited = np.asarray(part["iterations/objectives"], dtype=np.float64)
         if len(self.case.objectives) > 1:
             datasets |= self.combining.part(visited)
@@ -521,14 +546,16 @@ class _Run:
         columns = iteration_columns(self.case, state, before, self.final_objectives)
         names = [objective.name for objective in self.case.objectives]
         space = self.case.space
-        design = space.expand(state.best_alpha)
+        chosen = self.sizes.best
+        design = space.expand(state.best_alpha if chosen is None else chosen)
         begun = [each for each in self.states if each is not None]
+        begin = first_row(state, 1 if self.sizes.is_chosen(state) else 0)
         return Outcome(
             case=self.case,
             alpha=design[: space.n_alpha],
             variables=space.named(design),
             objectives=dict(zip(names, columns["objectives"][best_row(state)].tolist(), strict=True)),
-            initial_objectives=dict(zip(names, columns["objectives"][first_row(state)].tolist(), strict=True)),
+            initial_objectives=dict(zip(names, columns["objectives"][begin].tolist(), strict=True)),
             peaks=self.peaks,
             constraints=columns["constraints"][best_row(state)] if self.constraints is None else self.constraints,
             utopia=self.combining.utopia,
@@ -549,6 +576,7 @@ class _Run:
             integrator_reason=engine.integrator_reason,
             conclusion=self.conclusion,
             pricing=self.rounds.outcome,
+            sizes=self.sizes.outcome,
         )
 
 

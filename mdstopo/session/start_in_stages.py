@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.catalogue import has_catalogue
 from mdstopo.case.model import Case
 from mdstopo.case.stages import stage_case, stage_count
 from mdstopo.optimizer.problem import Problem, Sample
@@ -31,10 +32,10 @@ def stage_of(state: State) -> int:
     return int(column[-1]) if column else 0
 
 
-def first_row(state: State) -> int:
-    """The row of the history with which the state's stage begins."""
+def first_row(state: State, before: int = 0) -> int:
+    """The row of the history with which the state's stage begins, or one so many stages before it."""
     column = state.history.info.get(STAGE)
-    return int(np.searchsorted(np.array(column), column[-1])) if column else 0
+    return int(np.searchsorted(np.array(column), column[-1] - before)) if column else 0
 
 
 def iterations_of(state: State) -> int:
@@ -47,7 +48,7 @@ def iterations_of(state: State) -> int:
 
 def is_done(case: Case, state: State) -> bool:
     """Whether nothing is left to do: the last stage has ended, or one has failed, or others go on instead."""
-    last = state.status is RunStatus.FAILED or stage_of(state) == stage_count(case) - 1
+    last = state.status is RunStatus.FAILED or stage_of(state) >= stage_count(case) - 1
     return last and not state.running
 
 
@@ -86,7 +87,9 @@ def run_stages(
     """
     count = stage_count(case)
     if count == 1:
-        return run_start(case, problem, task, state, initial, keep, stop)
+        # where sizes are chosen afterwards the history says from the start which stage an iterate belongs to
+        only = Marked(problem, STAGE, 0) if has_catalogue(case) else problem
+        return run_start(case, only, task, state, initial, keep, stop)
 
     def problem_at(stage: int) -> Problem:
         return Marked(problem if stage == count - 1 else make(stage_case(case, stage)).problem(), STAGE, stage)

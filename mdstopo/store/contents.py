@@ -52,13 +52,21 @@ def case_part(case: Case) -> Datasets:
     pieces: Datasets = {
         "case": case.text,
         "resume/case": describe(case),
-        "members/p": _rows([group.p_world for group in groups], case.dimension),
-        "members/q": _rows([group.q_world for group in groups], case.dimension),
+        **ends_part(case),
         "members/group": np.repeat(texts([group.name for group in groups]), counts),
         "objectives": [objective.name for objective in case.objectives],
         "members/design": np.repeat(np.array([group.design for group in groups], dtype=np.bool_), counts),
     }
     return pieces | {f"files/{name}": digest for name, digest in case.files.items()}
+
+
+def ends_part(case: Case) -> Datasets:
+    """The ends of all members in their order, global at the start."""
+    groups = case.members
+    return {
+        "members/p": _rows([group.p_world for group in groups], case.dimension),
+        "members/q": _rows([group.q_world for group in groups], case.dimension),
+    }
 
 
 def trajectory_part(trajectories: Mapping[str, Motion]) -> Datasets:

@@ -20,9 +20,10 @@ _IGNORED: dict[type, set[str]] = {
     Case: {"path", "name", "text", "sha256", "files", "marks", "overrides", "warnings", "fit"},
     Body: {"stated"},
     LoadCase: {"bodies"},  # follow from the case's bodies and the motions
+    MemberGroup: {"from_points", "to_points", "cost_by_length"},  # its ends and its costs are compared
 }
 # What later versions added, and left out by most: files from before know nothing of it.
-_ADDED = {"shared", "mirrored", "variables", "prices", "powers", "candidates"}
+_ADDED = {"shared", "mirrored", "variables", "prices", "powers", "candidates", "movable", "points", "sizes"}
 _DESIGN = {"initial", "lower", "upper", "power"}
 _MAY_DIFFER = {"optimizer.max_iterations", "optimizer.tolerance", "optimizer.starts"}
 
@@ -99,7 +100,11 @@ def _key(path: str, field: str, owner: Any) -> str:
         return f"design.{field}.{owner.name}"
     if isinstance(owner, MemberGroup) and field == "laws" and len(owner.laws) == 1:
         return _join(path, "law")
-    if isinstance(owner, Case) and field in _ADDED:
+    if isinstance(owner, Case) and field == "movable":
+        return "points.movable"
+    if isinstance(owner, MemberGroup) and field in ("sizes", "prices"):
+        return f"design.catalogue.{owner.name}.{field}"
+    if isinstance(owner, Case) and field in _ADDED and field != "points":
         return f"design.{field}"
     if isinstance(owner, LoadCase) and field in ("start", "end"):
         return _join(path, f"time.{field}")

@@ -23,6 +23,7 @@ _KNOWN = frozenset(
     {
         "candidates",
         "case",
+        "catalogue",
         "combine",
         "design",
         "differences",

@@ -13,7 +13,7 @@ from .test_pages import run
 
 PAGE = (DOCS / "results.md").read_text(encoding="utf-8")
 #: what only the program reads
-OWN = ("optimizer/", "combine/tasks/", "pareto/tasks/", "sweep/tasks/")
+OWN = ("catalogue/search/", "optimizer/", "combine/tasks/", "pareto/tasks/", "sweep/tasks/")
 JOINTED = """\
 format: 1
 time: {end: 0.1}
@@ -35,6 +35,7 @@ combine: {weights: {E: 1, X: 1}, normalize: false}
 optimizer: {starts: 2, max_iterations: 1}
 """
 STAGED = VARIED.replace("  X: ", "#").replace("combine:", "#").replace("design: {", "design: {power: [1, 2], ")
+SOLD = STAGED.replace("power: [1, 2]", "catalogue: {spring: [0, 0.5, 1]}")
 
 PRICED = """\
 format: 1
@@ -92,6 +93,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     (folder / "jointed.yaml").write_text(JOINTED, encoding="utf-8")
     (folder / "varied.yaml").write_text(VARIED, encoding="utf-8")
     (folder / "staged.yaml").write_text(STAGED, encoding="utf-8")
+    (folder / "sold.yaml").write_text(SOLD, encoding="utf-8")
     (folder / "priced.yaml").write_text(PRICED, encoding="utf-8")
     (folder / "fitted.yaml").write_text(FITTED, encoding="utf-8")
     (folder / "way.csv").write_text("0.02, 0.03\n0.04, 0.07\n0.06, 0.1\n0.08, 0.14\n", encoding="utf-8")
@@ -106,6 +108,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "pareto boat.yaml --points 3 --starts 1",
         "run varied.yaml",
         "run staged.yaml",
+        "run sold.yaml",
         "run priced.yaml",
         "gradient varied.yaml --history --differences",
         "pareto varied.yaml --points 4 --starts 1",

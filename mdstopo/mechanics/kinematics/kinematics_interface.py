@@ -780,6 +780,24 @@ def member_rows(model, p, i, q, v, row, row_rate):
     raise NotImplementedError
 
 
+def end_slopes(model, p, i, side, along, q, v, a, row_slope):
+    """What moving an end of a member in its body does to the length and to the row B, at a fixed motion.
+
+    In:
+      model: the compiled scene.
+      p, i: the pair, and the member (padded).
+      side: whose end it is: 0 of the pair's first body, 1 of its second.
+      along (D - T or more,): the direction it moves in, in the axes in which the model has the body's points.
+      q (n_q,), v, a (n,): coordinates, velocities and accelerations.
+    Out:
+      row_slope (2 D,): slopes of B (1/m, without unit).
+
+    Returns the slopes, per m that the end moves, of the length, of its rate (1/s) and of its second derivative in time
+    (1/s^2), and that second derivative itself (m/s^2). Zeros where the member has no length.
+    """
+    raise NotImplementedError
+
+
 def inerter_row(model, q, v, i, p, row, row_rate):
     """B of a member, and what accelerations do not change of the elongation's second derivative.
 

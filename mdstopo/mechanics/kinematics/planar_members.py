@@ -404,3 +404,58 @@ def member_rows(model, p, i, q, v, row, row_rate):
     row_rate[4] = fy
     row_rate[5] = fy * qx - fx * qy - wb * (ex * qx + ey * qy)
     return stretch, rate
+
+
+@kernel
+def end_slopes(model, p, i, side, along, q, v, a, row_slope):
+    """What moving an end of a member does to its length and row; see `kinematics_interface.end_slopes`.
+
+    With r, r', r'' from the first end to the second, and d, d', d'' what they change by as the end moves,
+
+        dL = e . d,   de = (d - e dL)/L,   dL' = de . r' + e . d',
+        L'' = e . r'' + (|r'|^2 - L'^2)/L,   dL'' = de . r'' + e . d'' + (2 r' . d' - 2 L' dL' - (L'' - e . r'') dL)/L.
+    """
+    one = model.pair[p, 0]
+    two = model.pair[p, 1]
+    first = 3 * one
+    second = 3 * two
+    turn_one = turned_body(model.home, one, q[first + 2])
+    turn_two = turned_body(model.home, two, q[second + 2])
+    px, py, qx, qy, rx, ry, length, _ = member_between(model, i, one, two, q, turn_one, turn_two)
+    row_slope[:] = 0.0
+    if not length > 1e-15:
+        return 0.0, 0.0, 0.0, 0.0
+    ex = rx / length
+    ey = ry / length
+    wa = v[first + 2]
+    wb = v[second + 2]
+    vx = v[second] - wb * qy - v[first] + wa * py
+    vy = v[second + 1] + wb * qx - v[first + 1] - wa * px
+    ta = a[first + 2]
+    tb = a[second + 2]
+    ax = a[second] - tb * qy - wb * wb * qx - a[first] + ta * py + wa * wa * px
+    ay = a[second + 1] + tb * qx - wb * wb * qy - a[first + 1] - ta * px + wa * wa * py
+    c, s, _, _ = turn_two if side == 1 else turn_one
+    w = wb if side == 1 else wa
+    t = tb if side == 1 else ta
+    sign = 1.0 if side == 1 else -1.0
+    dx = sign * (c * along[0] - s * along[1])
+    dy = sign * (s * along[0] + c * along[1])
+    by_length = ex * dx + ey * dy
+    fx = (dx - ex * by_length) / length
+    fy = (dy - ey * by_length) / length
+    rate = ex * vx + ey * vy
+    by_rate = fx * vx + fy * vy + w * (ey * dx - ex * dy)
+    excess = (vx * vx + vy * vy - rate * rate) / length
+    by_push = ex * (-t * dy - w * w * dx) + ey * (t * dx - w * w * dy)
+    turning = w * (vy * dx - vx * dy)
+    by_second = fx * ax + fy * ay + by_push + (2.0 * turning - 2.0 * rate * by_rate - excess * by_length) / length
+    row_slope[0] = -fx
+    row_slope[1] = -fy
+    row_slope[2] = fx * py - fy * px
+    row_slope[3] = fx
+    row_slope[4] = fy
+    row_slope[5] = fy * qx - fx * qy
+    # the arm of the end that moves changes by the same vector, but for its sign
+    row_slope[3 * side + 2] += ey * dx - ex * dy
+    return by_length, by_rate, by_second, ex * ax + ey * ay + excess

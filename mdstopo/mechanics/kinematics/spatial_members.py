@@ -21,6 +21,7 @@ from mdstopo.mechanics.kinematics.spatial_grids import grid_designs, grid_sums
 from mdstopo.mechanics.kinematics.spatial_lines import (
     NO_LENGTH,
     add_line_stiffness,
+    centripetal,
     line_between,
     line_bias,
     line_rate_slopes,
@@ -63,8 +64,10 @@ from mdstopo.mechanics.kinematics.vectors import (
     dot,
     minus,
     plus,
+    put,
     times,
     turned,
+    turned_back,
     unit,
     vector_at,
 )
@@ -375,6 +378,60 @@ def member_rows(model, p, i, q, v, row, row_rate):
     line_row(turn_one, TURN, turn_two, TURN, first, second, e, row, 0)
     line_rate_slopes(turn_one, TURN, turn_two, TURN, first, second, e, length, v, one, two, row_rate)
     return stretch, dot(e, line_speed(turn_one, TURN, turn_two, TURN, first, second, v, one, two))
+
+
+@kernel
+def end_slopes(model, p, i, side, along, q, v, a, row_slope):
+    """What moving an end of a member does to its length and row; see `kinematics_interface.end_slopes`.
+
+    With r, r', r'' from the first end to the second, and d, d', d'' what they change by as the end moves,
+
+        dL = e . d,   de = (d - e dL)/L,   dL' = de . r' + e . d',
+        L'' = e . r'' + (|r'|^2 - L'^2)/L,   dL'' = de . r'' + e . d'' + (2 r' . d' - 2 L' dL' - (L'' - e . r'') dL)/L.
+    """
+    one = FREEDOMS * model.pair[p, 0]
+    two = FREEDOMS * model.pair[p, 1]
+    turn_one = turn_of(model, model.pair[p, 0], q)
+    turn_two = turn_of(model, model.pair[p, 1], q)
+    e, length, _ = line_of(model, p, i, turn_one, turn_two, q)
+    row_slope[:] = 0.0
+    if length <= NO_LENGTH:
+        return 0.0, 0.0, 0.0, 0.0
+    first = end_of(model.member, P, i)
+    second = end_of(model.member, Q, i)
+    speed = line_speed(turn_one, TURN, turn_two, TURN, first, second, v, one, two)
+    push = minus(
+        plus(vector_at(a, two), turned(turn_two, TURN, point_push(second, v, a, two))),
+        plus(vector_at(a, one), turned(turn_one, TURN, point_push(first, v, a, one))),
+    )
+    turn = turn_two if side == 1 else turn_one
+    at = two if side == 1 else one
+    sign = 1.0 if side == 1 else -1.0
+    own = vector_at(along, 0)
+    d = times(sign, turned(turn, TURN, own))
+    d_rate = times(sign, turned(turn, TURN, cross(vector_at(v, at + 3), own)))
+    d_push = times(sign, turned(turn, TURN, point_push(own, v, a, at)))
+    by_length = dot(e, d)
+    de = times(1.0 / length, minus(d, times(by_length, e)))
+    rate = dot(e, speed)
+    by_rate = dot(de, speed) + dot(e, d_rate)
+    excess = (dot(speed, speed) - rate * rate) / length
+    by_excess = (2.0 * dot(speed, d_rate) - 2.0 * rate * by_rate - excess * by_length) / length
+    put(row_slope, 0, times(-1.0, de))
+    put(row_slope, 3, cross(turned_back(turn_one, TURN, de), first))
+    put(row_slope, 6, de)
+    put(row_slope, 9, cross(second, turned_back(turn_two, TURN, de)))
+    add(row_slope, 3 + FREEDOMS * side, times(sign, cross(own, turned_back(turn, TURN, e))))
+    return by_length, by_rate, dot(de, push) + dot(e, d_push) + by_excess, dot(e, push) + excess
+
+
+@part
+def point_push(s, v, a, at):
+    """The acceleration of a point of a body beside that of its centre of mass, in the body's axes (m/s^2).
+
+    s: the point (m). v, a: velocities and accelerations, of which those of the body begin at `at`.
+    """
+    return plus(cross(vector_at(a, at + 3), s), centripetal(s, vector_at(v, at + 3)))
 
 
 @kernel

@@ -1,0 +1,96 @@
+"""Sizes from catalogues: what branch and bound chooses beside the best of all choices, on ten scenes."""
+
+import itertools
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mdstopo.bench.tables import Table
+from mdstopo.case.model import Case
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+from mdstopo.session import size_search
+from mdstopo.session.run_session import run_session
+
+SIZES = (0.0, 0.4, 1.0)
+#: of every second scene, in which all members have to be
+THERE = (0.1, 0.5, 1.0)
+#: mounts and hooks of each scene
+SCENES = ((2, 3), (2, 4), (3, 3), (2, 5), (3, 3), (2, 5), (3, 4), (2, 6), (4, 3), (3, 4))
+
+
+def scene(number: int) -> Case:
+    """A load between hooks, shaken, with a limit on what its straps may weigh; every scene has its own numbers."""
+    rng, sizes = np.random.default_rng(number), sizes_of(number)
+    mounts, hooks = SCENES[number]
+    around = np.sort(rng.uniform(0.0, 2.0 * np.pi, hooks))
+    content = {
+        "format": 1,
+        "time": {"end": 0.3},
+        "bodies": {"load": {"mass": 20, "inertia": 1, "position": [0, 0], "velocity": rng.normal(size=2).tolist()}},
+        "points": {
+            "mounts": {"body": "load", "grid": {"list": rng.uniform(-0.3, 0.3, (mounts, 2)).tolist()}},
+            "hooks": {"body": "ground", "grid": {"list": np.stack([np.cos(around), np.sin(around)], axis=1).tolist()}},
+        },
+        "members": {
+            "straps": {
+                "from": "mounts", "to": "hooks", "law": {"type": "spring", "stiffness": 3000}, "cost": "length",
+            },
+        },
+        "loads": [{"body": "load", "force": rng.uniform(-300, 300, 2).tolist(), "moment": float(rng.uniform(-60, 60))}],
+        "design": {"initial": 0.4, "lower": 0.5 * sizes[0], "catalogue": {"straps": list(sizes)}},
+        "objectives": {"G": {"response": {"displacement": {"body": "load", "at": [0.2, 0.1]}}}},
+        "constraints": [{"volume": "all", "fraction": 0.45}],
+        "solver": {"tolerance": 1e-7},
+    }  # fmt: skip
+    return read_case(json.dumps(content))
+
+
+def sizes_of(number: int) -> tuple[float, ...]:
+    """What a scene chooses from."""
+    return THERE if number % 2 else SIZES
+
+
+def all_choices(case: Case, kept: list[int], sizes: tuple[float, ...]) -> tuple[float, int]:
+    """The lowest objective of all choices for the members kept that the limit allows, and how many there are."""
+    evaluator, row = Evaluator(case), case.constraints[0]
+    best, count = float("inf"), 0
+    for choice in itertools.product(sizes, repeat=len(kept)):
+        design = np.full(case.n_design, sizes[0])
+        design[kept] = choice
+        if row.spent(design) > row.bound * (1.0 + 1e-9):
+            continue
+        count += 1
+        best = min(best, evaluator.evaluate(design, gradient=False).objectives["G"])
+    return best, count
+
+
+def catalogue() -> Iterator[Table]:
+    """Ten scenes: the search beside all choices."""
+    size_search.FEW = 0  # so that it is branch and bound that is measured
+    rows = []
+    for number in range(len(SCENES)):
+        case = scene(number)
+        plain = replace(case, members=tuple(replace(group, sizes=(), prices=()) for group in case.members))
+        continuous = run_session(plain)
+        sizes = sizes_of(number)
+        kept = np.flatnonzero(continuous.alpha >= 0.5 * (sizes[0] or sizes[1])).tolist()
+        outcome = run_session(case)
+        chosen = outcome.sizes
+        assert chosen is not None
+        assert chosen.members == len(kept)
+        began = time.perf_counter()
+        best, count = all_choices(case, kept, sizes)
+        spent = time.perf_counter() - began
+        rows.append(
+            [
+                str(case.n_design), str(len(kept)), f"{continuous.objectives['G']:.6g}", f"{chosen.objective:.6g}",
+                f"{best:.6g}", f"{chosen.objective / best - 1.0:.1e}", str(chosen.nodes), str(chosen.evaluations),
+                f"{count:,}", "yes" if chosen.exchanged else "no", f"{spent:.0f} s",
+            ]
+        )  # fmt: skip
+    head = ["members", "kept", "continuous", "chosen", "best of all", "above", "nodes", "evaluations", "all choices"]
+    yield Table("Sizes from a catalogue of three", [*head, "neighbour", "time of all"], rows)

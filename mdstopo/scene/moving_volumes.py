@@ -1,0 +1,84 @@
+"""Volume rows (Eq. 14) over members that cost their length, and whose ends are design variables.
+
+    sum alpha_i L_i,   d/d(alpha_i) = L_i,   d/dp = sum alpha_i e_i . dr_i/dp
+
+with the direction e_i of a member at the start and r_i from its first end to its second. Such a row is no line in the
+design, so the optimiser gets it as it gets a constraint on a response.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.model import Case, MemberGroup, ResponseRow, VolumeRow
+from mdstopo.case.movable import points_at, turned_out
+from mdstopo.case.start_geometry import frames_of
+from mdstopo.scene.bodies import distances
+
+
+def moves(case: Case, group: MemberGroup) -> bool:
+    """Whether members of a group cost their length, and it varies."""
+    names = {each.grid for each in case.movable}
+    return group.design and group.cost_by_length and bool(names & {group.from_points, group.to_points})
+
+
+def moving_volumes(case: Case) -> dict[int, MovingVolume]:
+    """By number of the constraint: volume rows whose coefficients vary."""
+    groups = [group.name for group in case.members if moves(case, group)] if case.movable else []
+    return {
+        i: MovingVolume(case, row)
+        for i, row in enumerate(case.constraints)
+        if isinstance(row, VolumeRow) and set(row.groups) & set(groups)
+    }
+
+
+def spent(case: Case, row: VolumeRow | ResponseRow, design: FloatArray) -> float:
+    """The sum of a volume row with a design (N + P,), members as long as it makes them."""
+    assert isinstance(row, VolumeRow)
+    return MovingVolume(case, row).at(design)[0] if case.movable else row.spent(design)
+
+
+class MovingVolume:
+    """The sum of one volume row, and its derivative."""
+
+    def __init__(self, case: Case, row: VolumeRow) -> None:
+        self._case, self._row = case, row
+        self._frames = frames_of(case)
+        self._parts = case.group_slices
+        self._groups = [group for group in case.design_groups if group.name in row.groups and moves(case, group)]
+        self._movable = {each.grid: each for each in case.movable}
+
+    def at(self, design: FloatArray) -> tuple[float, FloatArray]:
+        """The sum at a design (N + P,), and its derivative (N + P,)."""
+        n, space = self._case.n_design, self._case.space
+        local = points_at(self._case, space.named(design))
+        slope = np.zeros(space.length)
+        slope[:n] = self._row.coefficients
+        slope[n:] = self._row.prices if len(self._row.prices) else 0.0
+        by_ends = np.zeros(space.length)
+        for group in self._groups:
+            part = self._parts[group.name]
+            first = self._ends(group.body_from, local.get(group.from_points, group.from_local))[group.from_index]
+            second = self._ends(group.body_to, local.get(group.to_points, group.to_local))[group.to_index]
+            apart = second - first
+            length = distances(apart)
+            slope[part] = length
+            size = length[:, None]
+            pull = np.divide(design[part][:, None] * apart, size, out=np.zeros_like(apart), where=size > 0.0)
+            self._add(group.from_points, -pull, group.from_index, by_ends)
+            self._add(group.to_points, pull, group.to_index, by_ends)
+        return float(slope @ design), slope + by_ends
+
+    def _ends(self, body: str, points: FloatArray) -> FloatArray:
+        return self._frames.to_world(body, points)
+
+    def _add(self, points: str, pull: FloatArray, index: IndexArray, out: FloatArray) -> None:
+        """Add what moving the points of a grid does; pull (M, d): alpha e of the members that end there."""
+        grid = self._movable.get(points)
+        if grid is None:
+            return
+        axes = turned_out(self._frames, grid.body, grid.axes)
+        for name, axis in zip(grid.variables, axes, strict=True):
+            part = self._case.space.parts[name]
+            out[part] += np.bincount(index, pull @ axis, part.stop - part.start)

@@ -1,0 +1,450 @@
+"""The best choice of sizes from a catalogue: branch and bound, in which every choice that counts is evaluated exactly.
+
+A node has a range of sizes for each variable. Its relaxation, any number within the ranges, is solved by the optimiser
+from the design of the node above. Where the optimum has a number between two sizes, one more node has the sizes up to
+the lower of them and one those from the upper on. A node is left where its relaxation is no better than the best choice
+known, and where it has a size everywhere. Every relaxation is solved from the middle of its ranges, too. In the end the
+neighbours of the best choices that were met are tried.
+
+The optimiser finds local optima. So what a node's relaxation gives is no bound that is proven: a choice behind it may
+be better where the problem has several optima. Where all choices are few, all are evaluated, and the best is the best.
+"""
+
+import heapq
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.optimizer.nearest_feasible import InfeasibleRows, project
+from mdstopo.optimizer.problem import LinearRows, Problem, Sample
+from mdstopo.optimizer.state import State
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: so many choices are all evaluated, where nothing varies beside them
+FEW = 1000
+#: evaluations after which the search ends with the best so far, and what it has not looked into
+MOST_EVALUATIONS = 50_000
+#: how near to a size, as a share of the way to the next one, a number counts as it
+AT_A_SIZE = 1e-6
+#: what linear rows may be missed by, relative to the size of their sums
+ROWS = 1e-9
+#: pairs of variables up to which a good choice is tried with one size up and another one down
+EXCHANGES = 2500
+#: so many of the best choices that were met are the beginnings of such trials
+BEGINNINGS = 8
+
+
+class Sold(NamedTuple):
+    """Variables with a catalogue.
+
+    place (k,): which of x (n,) they are. sizes, prices: of each, rising.
+    """
+
+    place: Ints
+    sizes: tuple[Floats, ...]
+    prices: tuple[Floats, ...]
+
+    def at(self, x: Floats, choice: Ints) -> Floats:
+        """x with the sizes that are chosen (k,)."""
+        out = x.copy()
+        out[self.place] = [sizes[i] for sizes, i in zip(self.sizes, choice.tolist(), strict=True)]
+        return out
+
+    @property
+    def choices(self) -> int:
+        """How many there are."""
+        return math.prod(len(sizes) for sizes in self.sizes)
+
+
+class Within:
+    """A problem within other bounds and with other linear rows; it counts evaluations."""
+
+    def __init__(self, problem: Problem, counts: list[int], lower: Floats, upper: Floats, linear: LinearRows) -> None:
+        self.lower, self.upper, self.linear = lower, upper, linear
+        self.initial = np.clip(problem.initial, lower, upper)
+        self._problem, self._counts = problem, counts
+
+    def __getattr__(self, name: str) -> Any:
+        """What only some problems have."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._problem, name)
+
+    def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
+        self._counts[0] += 1
+        return self._problem.evaluate(x, gradient)
+
+
+@dataclass(order=True)
+class Node:
+    """A range of sizes for each variable: low to high (k,), both included, as numbers of sizes.
+
+    bound: the optimum of the relaxation of the node above; number: of equal ones the first comes first. x: where the
+    relaxation begins.
+    """
+
+    bound: float
+    number: int
+    low: Ints = field(compare=False)
+    high: Ints = field(compare=False)
+    x: Floats = field(compare=False)
+
+
+@dataclass
+class Found:
+    """What the search has found so far.
+
+    choice (k,), x (n,), objective: the best; None and infinite before there is one. nodes, evaluations: so far.
+    bound: the least optimum of a relaxation that is open; the objective where none is. finished: whether no node is
+    left. exhaustive: whether all choices were evaluated. exchanged: whether the best was found by trying neighbours of
+    the best of all nodes, behind a node that was left.
+    """
+
+    choice: Ints | None = None
+    x: Floats | None = None
+    objective: float = float("inf")
+    nodes: int = 0
+    evaluations: int = 0
+    bound: float = float("-inf")
+    finished: bool = False
+    exhaustive: bool = False
+    exchanged: bool = False
+
+
+def rows_for_sizes(rows: LinearRows, sold: Sold) -> LinearRows:
+    """The linear rows that a choice has to keep.
+
+    A sum that is to be equal can seldom be met by sizes. It must not be exceeded, and must not fall short by more than
+    the largest step from one size of one member to the next.
+    """
+    weights = np.abs(rows.A[:, sold.place])
+    steps = np.array([np.diff(prices).max(initial=0.0) for prices in sold.prices])
+    split = rows.equal & (weights.max(axis=1, initial=0.0) > 0.0)
+    short = (weights * steps).max(axis=1, initial=0.0)
+    return LinearRows(
+        np.concatenate([rows.A, -rows.A[split]]),
+        np.concatenate([rows.b, (short - rows.b)[split]]),
+        np.concatenate([rows.equal & ~split, np.zeros(int(split.sum()), dtype=np.bool_)]),
+    )
+
+
+class SizeSearch:
+    """A search that can be stopped and taken up again (`to_arrays`)."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        sold: Sold,
+        x: Floats,
+        solve: Callable[[Problem, Floats], State],
+        tolerance: float,
+    ) -> None:
+        """Begin at the continuous optimum x (n,).
+
+        problem: of all variables; those that are sold but not in `sold` are where they stay, in its bounds.
+        sold: the variables whose sizes are chosen.
+        solve: optimises a problem from a design on.
+        tolerance: relative; a node has to promise so much more than the best choice.
+        """
+        self._counts = [0]
+        self._sold, self._solve, self._tolerance = sold, solve, tolerance
+        self._rows = rows_for_sizes(problem.linear, sold)
+        self._problem = problem
+        self._others = np.setdiff1d(np.flatnonzero(problem.upper > problem.lower), sold.place)
+        self.found = Found()
+        k = len(sold.place)
+        last = np.array([len(sizes) - 1 for sizes in sold.sizes], dtype=np.int64)
+        self._open = [Node(float("-inf"), 0, np.zeros(k, dtype=np.int64), last, x.copy())]
+        self._made = 1
+        self._start = x
+        #: choices that were evaluated -> their objective, infinite where they keep no constraint
+        self._known: dict[tuple[int, ...], float] = {}
+        #: whether the neighbours of the best choices have been tried
+        self._refined = False
+
+    # -- the search
+
+    def run(self, stop: Callable[[], bool], keep: Callable[[Found], None]) -> Found:
+        """Search on until nothing is left, or stop() says so; keep sees what has been found after each node."""
+        found = self.found
+        if self._sold.choices <= FEW and not len(self._others):
+            self._try_all(stop)
+        while self._open and not found.exhaustive and not stop() and self._counts[0] < MOST_EVALUATIONS:
+            node = heapq.heappop(self._open)
+            if node.bound < self._cutoff():
+                self._look_into(node)
+                found.nodes += 1
+            self._tell()
+            keep(found)
+        if not self._open and not found.exhaustive and not self._refined:
+            self._refined = self._refine(stop)
+        self._tell()
+        keep(found)
+        return found
+
+    def _tell(self) -> None:
+        self.found.evaluations = self._counts[0]
+        least = min((node.bound for node in self._open), default=float("inf"))
+        self.found.finished = not self._open and (self._refined or self.found.exhaustive)
+        self.found.bound = min(least, self.found.objective)
+
+    def _cutoff(self) -> float:
+        best = self.found.objective
+        return best - self._tolerance * abs(best) if np.isfinite(best) else best
+
+    def _try_all(self, stop: Callable[[], bool]) -> None:
+        ranges = [range(len(sizes)) for sizes in self._sold.sizes]
+        for choice in product(*ranges):
+            if stop():
+                return
+            self._try(np.array(choice, dtype=np.int64), self._start)
+        self._open = []
+        self.found.exhaustive = True
+
+    def _look_into(self, node: Node) -> None:
+        """Solve the relaxation of a node, try what is near its optimum, and open what is behind it."""
+        relaxed = self._relaxed(node)
+        state = self._solved(relaxed, node.x)
+        if state is None:
+            return
+        x, value = state.best_alpha, float(state.best_objective)
+        slope = state.gradients[0] if len(state.gradients) else np.zeros(len(x))
+        self._try_near(node, x, slope)
+        if value >= self._cutoff():
+            return
+        away = [
+            self._away(x[place], sizes)
+            for place, sizes in zip(self._sold.place.tolist(), self._sold.sizes, strict=True)
+        ]
+        most = int(np.argmax([share for share, _ in away]))
+        share, below = away[most]
+        if share <= AT_A_SIZE:
+            choice = np.clip(self._nearest(x), node.low, node.high)
+            if self._excess(choice, x) <= 0.0:
+                self._try(choice, x)
+                return
+            # the line that stands for the prices lies below them here: shorter ranges have a closer one
+            widths = node.high - node.low
+            most = int(np.argmax(widths))
+            if widths[most] == 0:
+                return
+            below = min(int(choice[most]), int(node.high[most]) - 1)
+        for low, high in ((node.low[most], below), (below + 1, node.high[most])):
+            if low > high:
+                continue
+            ends = node.low.copy(), node.high.copy()
+            ends[0][most], ends[1][most] = low, high
+            heapq.heappush(self._open, Node(value, self._made, *ends, x.copy()))
+            self._made += 1
+
+    def _solved(self, relaxed: Within, x: Floats) -> State | None:
+        """The better optimum of a relaxation, from a design on and from the middle; None where none keeps the rows."""
+        found: list[State] = []
+        middle = x.copy()
+        middle[self._sold.place] = 0.5 * (relaxed.lower + relaxed.upper)[self._sold.place]
+        for start in (x, middle):
+            try:
+                begin = project(
+                    np.clip(start, relaxed.lower, relaxed.upper), relaxed.lower, relaxed.upper, relaxed.linear
+                )
+            except InfeasibleRows:
+                return None
+            state = self._solve(relaxed, begin)
+            if np.isfinite(state.best_objective) and state.best_violation <= self._tolerance:
+                found.append(state)
+        return min(found, key=lambda each: each.best_objective, default=None)
+
+    def _relaxed(self, node: Node) -> Within:
+        """The problem of a node: any number within its ranges, at the least price that sizes there allow."""
+        lower, upper = self._problem.lower.copy(), self._problem.upper.copy()
+        slope, offset = np.ones((len(self._rows), len(lower))), np.zeros((len(self._rows), len(lower)))
+        for k, place in enumerate(self._sold.place.tolist()):
+            i, j = int(node.low[k]), int(node.high[k])
+            sizes, prices = self._sold.sizes[k][i : j + 1], self._sold.prices[k][i : j + 1]
+            lower[place], upper[place] = sizes[0], sizes[-1]
+            steps = (prices[1:] - prices[0]) / (sizes[1:] - sizes[0])
+            for r in range(len(self._rows)):
+                least = self._rows.A[r, place] >= 0.0
+                rise = 0.0 if not len(steps) else float(steps.min() if least else steps.max())
+                slope[r, place], offset[r, place] = rise, prices[0] - rise * sizes[0]
+        rows = self._rows
+        linear = LinearRows(rows.A * slope, rows.b - np.sum(rows.A * offset, axis=1), rows.equal)
+        return Within(self._problem, self._counts, lower, upper, linear)
+
+    # -- choices
+
+    def _away(self, value: float, sizes: Floats) -> tuple[float, int]:
+        """How far a number is from its nearest size, as a share of the way between the two beside it; the lower one."""
+        below = int(np.clip(np.searchsorted(sizes, value, side="right") - 1, 0, max(len(sizes) - 2, 0)))
+        if len(sizes) == 1:
+            return 0.0, 0
+        share = (value - sizes[below]) / (sizes[below + 1] - sizes[below])
+        return float(min(abs(share), abs(1.0 - share))), below
+
+    def _nearest(self, x: Floats) -> Ints:
+        pairs = zip(self._sold.place.tolist(), self._sold.sizes, strict=True)
+        return np.array([int(np.abs(sizes - x[place]).argmin()) for place, sizes in pairs], dtype=np.int64)
+
+    def _try_near(self, node: Node, x: Floats, slope: Floats) -> None:
+        """Try the nearest sizes, made to keep the rows by what costs least, and then what else there is room for."""
+        choice = np.clip(self._nearest(x), node.low, node.high)
+        gains = slope[self._sold.place]
+        if not self._mend(choice, x, gains):
+            return
+        while True:
+            up = []
+            for k, i in enumerate(choice.tolist()):
+                if i + 1 < len(self._sold.sizes[k]) and gains[k] < 0.0:
+                    choice[k] += 1
+                    if self._excess(choice, x) <= 0.0:
+                        up.append((self._loss(k, i, i + 1, gains), k))
+                    choice[k] -= 1
+            if not up or min(up)[0] >= 0.0:
+                break
+            choice[min(up)[1]] += 1
+        self._try(choice, x)
+
+    def _mend(self, choice: Ints, x: Floats, gains: Floats) -> bool:
+        """Change a choice, one size at a time by what costs least, until it keeps the rows; whether it does."""
+        for _ in range(2 * sum(map(len, self._sold.sizes)) + 1):
+            missed = self._missed(choice, x)
+            if not missed.max(initial=0.0) > 0.0:
+                return True
+            row = self._rows.A[int(missed.argmax()), self._sold.place]
+            moves = []
+            for k, i in enumerate(choice.tolist()):
+                by = -1 if row[k] > 0.0 else 1
+                if row[k] != 0.0 and 0 <= i + by < len(self._sold.sizes[k]):
+                    moves.append((self._loss(k, i, i + by, gains), k, by))
+            if not moves:
+                return False
+            _, k, by = min(moves)
+            choice[k] += by
+        return False
+
+    def _loss(self, k: int, i: int, j: int, gains: Floats) -> float:
+        """What going from size i to j of variable k does to the objective, to first order, by what it saves."""
+        sizes, prices = self._sold.sizes[k], self._sold.prices[k]
+        change = float(gains[k]) * float(sizes[j] - sizes[i])
+        saved = abs(float(prices[j] - prices[i]))
+        weight = float(np.abs(self._rows.A[:, self._sold.place[k]]).max(initial=0.0)) * saved
+        return change / weight if weight > 0.0 else change
+
+    def _excess(self, choice: Ints, x: Floats) -> float:
+        """By how much the rows are missed by a choice, at its prices; not above zero where they are kept."""
+        return float(self._missed(choice, x).max(initial=0.0))
+
+    def _missed(self, choice: Ints, x: Floats) -> Floats:
+        """(m,) by how much each row is missed, beyond rounding."""
+        paid = x.copy()
+        paid[self._sold.place] = [prices[i] for prices, i in zip(self._sold.prices, choice.tolist(), strict=True)]
+        miss = self._rows.excess(paid)
+        miss = np.where(self._rows.equal, 0.0, miss)
+        size = np.abs(self._rows.A) @ np.abs(paid) + np.abs(self._rows.b)
+        return np.asarray(miss - ROWS * size)
+
+    def _try(self, choice: Ints, x: Floats) -> bool:
+        """Evaluate a choice, with what else varies at its best; whether it is better than the best so far."""
+        key = tuple(choice.tolist())
+        if key in self._known or self._excess(choice, x) > 0.0:
+            return False
+        self._known[key] = float("inf")
+        if len(self._others):
+            fixed = self._relaxed(Node(0.0, 0, choice, choice, x))
+            try:
+                begin = project(self._sold.at(x, choice), fixed.lower, fixed.upper, fixed.linear)
+            except InfeasibleRows:
+                return False
+            state = self._solve(fixed, begin)
+            value, violation, there = state.best_objective, state.best_violation, state.best_alpha
+        else:
+            self._counts[0] += 1
+            there = self._sold.at(x, choice)
+            sample = self._problem.evaluate(there, gradient=False)
+            usable = sample.status.usable and np.isfinite(sample.objective)
+            value = sample.objective if usable else float("inf")
+            violation = float(sample.constraint_rows.max(initial=0.0)) if usable else float("inf")
+        if violation > self._tolerance:
+            return False
+        self._known[key] = float(value)
+        if not value < self.found.objective:
+            return False
+        self.found.choice, self.found.x, self.found.objective = choice.copy(), there, float(value)
+        return True
+
+    def _refine(self, stop: Callable[[], bool]) -> bool:
+        """Go downhill from the best choices that were met, to better neighbours; whether it came to its end."""
+        usable = [(value, key) for key, value in self._known.items() if np.isfinite(value)]
+        for value, key in sorted(usable)[: 1 if len(self._others) else BEGINNINGS]:
+            at, height = np.array(key, dtype=np.int64), value
+            lower = True
+            while lower and self._counts[0] < MOST_EVALUATIONS:
+                lower = False
+                for choice in self._neighbours(at):
+                    if stop():
+                        return False
+                    self.found.exchanged |= self._try(choice, self._start if self.found.x is None else self.found.x)
+                    there = self._known.get(tuple(choice.tolist()), float("inf"))
+                    if there < height:
+                        at, height, lower = choice, there, True
+        return True
+
+    def _neighbours(self, choice: Ints) -> Iterator[Ints]:
+        k = len(choice)
+        last = np.array([len(sizes) - 1 for sizes in self._sold.sizes])
+        moves = [[(i, 1)] for i in range(k)] + [[(i, -1)] for i in range(k)]
+        if k * k <= EXCHANGES and not len(self._others):
+            moves += [[(i, 1), (j, -1)] for i in range(k) for j in range(k) if i != j]
+        for move in moves:
+            other = choice.copy()
+            for i, by in move:
+                other[i] += by
+            if np.all(other >= 0) and np.all(other <= last):
+                yield other
+
+    # -- keeping
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything that a later process needs to go on, by name."""
+        found, k, n = self.found, len(self._sold.place), len(self._start)
+        nodes = sorted(self._open)
+        return {
+            "open_bound": np.array([node.bound for node in nodes], dtype=np.float64),
+            "open_number": np.array([node.number for node in nodes], dtype=np.int64),
+            "open_low": np.array([node.low for node in nodes], dtype=np.int64).reshape(len(nodes), k),
+            "open_high": np.array([node.high for node in nodes], dtype=np.int64).reshape(len(nodes), k),
+            "open_x": np.array([node.x for node in nodes], dtype=np.float64).reshape(len(nodes), n),
+            "choice": np.full(k, -1, dtype=np.int64) if found.choice is None else found.choice,
+            "x": np.full(n, np.nan) if found.x is None else found.x,
+            "tried": np.array(list(self._known), dtype=np.int64).reshape(len(self._known), k),
+            "values": np.array(list(self._known.values()), dtype=np.float64),
+            "numbers": np.array(
+                [found.objective, found.nodes, self._counts[0], self._made, self._refined, found.exchanged],
+                dtype=np.float64,
+            ),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take up what `to_arrays` gave. Raises KeyError or ValueError where something is missing."""
+        columns = (arrays[f"open_{name}"] for name in ("bound", "number", "low", "high", "x"))
+        self._open = [
+            Node(float(bound), int(number), np.array(low), np.array(high), np.array(x))
+            for bound, number, low, high, x in zip(*columns, strict=True)
+        ]
+        heapq.heapify(self._open)
+        objective, nodes, evaluations, made, refined, exchanged = arrays["numbers"].tolist()
+        self._counts[0], self._made, self._refined = int(evaluations), int(made), bool(refined)
+        tried = map(tuple, np.asarray(arrays["tried"]).tolist())
+        self._known = dict(zip(tried, np.asarray(arrays["values"]).tolist(), strict=True))
+        known = arrays["choice"].min(initial=0) >= 0
+        self.found = Found(
+            np.array(arrays["choice"]) if known else None, np.array(arrays["x"]) if known else None, float(objective),
+            int(nodes), int(evaluations), exchanged=bool(exchanged),
+        )  # fmt: skip

@@ -1,0 +1,223 @@
+"""The last stage of a run whose case has a catalogue: the sizes of the members that are kept (`size_search`)."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.catalogue import has_catalogue
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.case.stages import stage_count
+from mdstopo.case.words import count_text
+from mdstopo.optimizer.interface import run as run_optimizer
+from mdstopo.optimizer.problem import Problem
+from mdstopo.optimizer.state import State
+from mdstopo.scene.moving_volumes import moves
+from mdstopo.session.outcome import ChosenSizes
+from mdstopo.session.size_search import MOST_EVALUATIONS, Found, SizeSearch, Sold, Within
+from mdstopo.session.start_in_stages import STAGE, Marked, continued, stage_of
+from mdstopo.starts.single_start import make_optimizer
+from mdstopo.status import RunStatus
+from mdstopo.store.contents import Datasets, design_part
+from mdstopo.store.result_reader import ResultView
+from mdstopo.store.store_errors import DamagedError
+
+Floats = NDArray[np.float64]
+
+#: where a file has what is known of the choice, and what only the search reads
+CATALOGUE, SEARCH = "catalogue", "catalogue/search"
+#: members with less than this share of the least size above 0 are not kept
+KEPT = 0.5
+
+
+class Sizes:
+    """The choice of sizes of one run. outcome: what is known of it, None before it has begun."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.outcome: ChosenSizes | None = None
+        #: whether there is, or was, something to choose from
+        self.asked = has_catalogue(case)
+        self._search: SizeSearch | None = None
+        self._before: ResultView | None = None
+        self._continuous = float("nan")
+        self._kept = 0
+
+    def refuse(self) -> None:
+        """Refuse what no sizes can be chosen for. Raises CaseError."""
+        wrong = [group.name for group in self.case.design_groups if group.sizes and moves(self.case, group)]
+        if wrong and any(hasattr(row, "coefficients") for row in self.case.constraints):
+            message = f"the members of {wrong[0]!r} cost a length that varies; sizes are chosen for lengths that stay"
+            place = self.case.marks.mistake(f"design.catalogue.{wrong[0]}", message)
+            raise CaseError([place], str(self.case.path or self.case.name))
+
+    def restore(self, view: ResultView) -> None:
+        """Take up what an earlier process has found."""
+        self._before = view if f"{SEARCH}/numbers" in view.arrays else None
+
+    def is_chosen(self, state: State) -> bool:
+        """Whether a state is that of the sizes chosen."""
+        return self.asked and stage_of(state) >= stage_count(self.case)
+
+    def choose(
+        self,
+        problem: Problem,
+        state: State,
+        stop: Callable[[], bool],
+        keep: Callable[[], None],
+        notify: Callable[[str], None],
+    ) -> State:
+        """Choose sizes behind the continuous optimum of a state; the state with the choice, or the same where that has
+        not come to its end.
+
+        problem: that of the last stage.
+        stop: asked between evaluations whether to stop.
+        keep: called whenever there is something to save.
+        notify: is given sentences for the user.
+        """
+        held, sold = self._sold(problem, state.best_alpha)
+        self._continuous, self._kept = float(state.best_objective), len(sold.place)
+        search = SizeSearch(held, sold, held.initial, self._solve, self.case.optimizer.tolerance)
+        self._search = search
+        if self._before is not None:
+            try:
+                search.restore(self._before.under(SEARCH))
+            except (KeyError, ValueError, TypeError) as error:
+                raise DamagedError(
+                    f"{self._before.path}: damaged: the search for sizes is not whole ({error})"
+                ) from error
+        of = count_text(int(self._members().sum()))
+        notify(f"choosing sizes of {len(sold.place)} members of {of}, {count_text(sold.choices)} choices")
+
+        def tell(found: Found) -> None:
+            self.outcome = self._outcome(found, sold)
+            keep()
+
+        found = search.run(stop, tell)
+        self.outcome = self._outcome(found, sold)
+        if (not found.finished and stop()) or found.x is None:
+            return state
+        # its sizes have been checked at their prices, and it does not move: rows that are free of bounds hold it
+        rows = problem.linear
+        free = replace(
+            rows, b=np.full(len(rows), np.abs(rows.A).sum() + np.abs(rows.b).sum()), equal=rows.equal & False
+        )
+        marked = Marked(Within(problem, [0], found.x, found.x, free), STAGE, stage_count(self.case))
+        last = continued(state, make_optimizer(self.case, marked).start(found.x))
+        last.history.constraints[-1] = rows.excess(found.x)
+        last.evaluations += found.evaluations
+        last.history.evaluations[-1] += found.evaluations
+        # a choice is no optimum of numbers: no residual tells how far it is from one
+        last.kkt = last.history.kkt[-1] = float("nan")
+        last.status = RunStatus.CONVERGED if found.finished else RunStatus.MAX_ITERATIONS
+        last.reason = self._reason(found)
+        return last
+
+    def conclude(self, state: State) -> tuple[RunStatus, str] | None:
+        """How the run ends where no sizes have been chosen; None where they have, or were not asked for."""
+        if not self.asked or self.is_chosen(state) or self.outcome is None:
+            return None
+        ended = self.outcome.finished or self.outcome.evaluations >= MOST_EVALUATIONS
+        if ended and not self.outcome.sizes:
+            what = "keeps the constraints" if self.outcome.finished else f"was found in {self.outcome.nodes} nodes"
+            return RunStatus.FAILED, f"no choice of sizes {what}; the design is the continuous optimum"
+        return RunStatus.INTERRUPTED, "stopped on request while sizes were chosen; the best choice so far is saved"
+
+    def part(self) -> Datasets:
+        """What a file keeps of the search, and before its end the best choice as the design."""
+        if self._search is None:
+            return {}
+        found = self._search.found
+        part: Datasets = {f"{SEARCH}/{name}": array for name, array in self._search.to_arrays().items()}
+        part[f"{CATALOGUE}/continuous"] = np.array(self._sign * self._continuous)
+        part[f"{CATALOGUE}/bound"] = np.array(self._sign * found.bound)
+        if found.x is not None:
+            part |= design_part(self.case, self.case.space.expand(found.x))
+        return part
+
+    @property
+    def best(self) -> Floats | None:
+        """The best choice so far as x (n,), None before there is one."""
+        return None if self._search is None else self._search.found.x
+
+    # -- how
+
+    @property
+    def _sign(self) -> float:
+        """-1 where the objective is to be maximised, and so U is its negative."""
+        return -1.0 if self.case.objectives[0].sense == "maximize" else 1.0
+
+    def _members(self) -> NDArray[np.bool_]:
+        """(N,) which design members have a catalogue."""
+        groups = self.case.design_groups
+        return np.repeat([bool(group.sizes) for group in groups], [len(group) for group in groups])
+
+    def _sold(self, problem: Problem, x: Floats) -> tuple[Within, Sold]:
+        """The problem with members that are not kept at their least size, and the variables of the others."""
+        space = self.case.space
+        # alpha i is x[slot i]: seen by expanding the places
+        slots = space.expand(np.arange(space.size, dtype=np.float64))[: space.n_alpha].astype(np.int64)
+        lower, upper, begin = problem.lower.copy(), problem.upper.copy(), x.copy()
+        places: dict[int, tuple[Floats, Floats]] = {}
+        for group in self.case.design_groups:
+            sizes, prices = np.array(group.sizes), np.array(group.prices)
+            positive = sizes[sizes > 0.0]
+            if not len(positive):
+                continue
+            for place in np.unique(slots[self.case.group_slices[group.name]]).tolist():
+                if x[place] < KEPT * positive[0]:
+                    lower[place] = upper[place] = begin[place] = sizes[0]
+                else:
+                    places[place] = sizes, prices
+        order = sorted(places)
+        sold = Sold(np.array(order, dtype=np.int64), *(tuple(places[p][k] for p in order) for k in range(2)))
+        held = Within(problem, [0], lower, upper, problem.linear)
+        held.initial = begin
+        return held, sold
+
+    def _solve(self, problem: Problem, x: Floats) -> State:
+        optimizer = make_optimizer(self.case, problem)
+        return run_optimizer(optimizer, optimizer.start(x))
+
+    def _outcome(self, found: Found, sold: Sold) -> ChosenSizes:
+        sign, chosen = self._sign, {}
+        if found.x is not None:
+            design = self.case.space.expand(found.x)
+            for group in self.case.design_groups:
+                own = design[self.case.group_slices[group.name]]
+                if group.sizes:
+                    chosen[group.name] = {
+                        size: int(np.count_nonzero(np.abs(own - size) <= 1e-12)) for size in group.sizes
+                    }
+        return ChosenSizes(
+            members=self._kept, choices=sold.choices, objective=sign * found.objective,
+            continuous=sign * self._continuous, bound=sign * found.bound, nodes=found.nodes,
+            evaluations=found.evaluations, exhaustive=found.exhaustive, exchanged=found.exchanged,
+            finished=found.finished, sizes=chosen,
+        )  # fmt: skip
+
+    def _reason(self, found: Found) -> str:
+        if found.exhaustive:
+            how = "the best of all choices"
+        elif found.finished:
+            how = f"no one of {found.nodes} nodes has a better relaxation"
+        else:
+            how = f"the best of {found.nodes} nodes, after which the search ends"
+        size = abs(self._continuous) or 1.0
+        worse = (found.objective - self._continuous) / size
+        return (
+            f"sizes of {self._kept} members chosen: {how}, {found.evaluations} evaluations; "
+            f"{worse:.3%} worse than the continuous optimum"
+        )
+
+
+def at_prices(case: Case, design: Floats) -> Floats:
+    """A design (N + P,) of chosen sizes with their prices in the place of alpha: what volume rows sum up."""
+    paid = design.copy()
+    for group in case.design_groups:
+        own = design[case.group_slices[group.name]]
+        for size, price in zip(group.sizes, group.prices, strict=True):
+            paid[case.group_slices[group.name]][own == size] = price
+    return paid

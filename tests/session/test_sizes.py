@@ -1,0 +1,170 @@
+"""Sizes from a catalogue as the last stage of a run: beside all choices, in the file, stopped and resumed, refused."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+from mdstopo.session.run_session import run_session
+from mdstopo.status import RunStatus
+from mdstopo.store.result_reader import read_result
+
+CASE = """
+format: 1
+gravity: [0, -9.8]
+time: {end: 0.2}
+bodies:
+  crate: {mass: 60, inertia: 10, position: [0, 0]}
+  truck: {mass: 2000, inertia: 6000, position: [0, -1]}
+points:
+  edge: {body: crate, grid: {rectangle: {center: [0, 0], size: [0.5, 0.5], count: 4}}}
+  bed: {body: truck, grid: {line: {from: [-0.8, -1], to: [0.8, -1], count: 2}}}
+members:
+  straps: {from: edge, to: bed, law: {type: spring, stiffness: 4000, damping: 20}}
+loads:
+  - {body: truck, acceleration: [9.8, 0], angular_acceleration: 20}
+design: {initial: 0.3, lower: 0, catalogue: {straps: SIZES}}
+objectives:
+  G: {response: {displacement: {body: crate, relative_to: truck}}}
+constraints:
+  - {volume: all, limit: 3.5}
+solver: {tolerance: 1e-8}
+"""
+
+
+def case_with(sizes, **changes):
+    text = CASE.replace("SIZES", sizes)
+    for old, new in changes.get("replace", ()):
+        assert old in text
+        text = text.replace(old, new)
+    return read_case(text)
+
+
+def brute(case, outcome, sizes, paid=None):
+    """The best of all choices for the members that were kept, the others at the least size."""
+    price = dict(zip(sizes, sizes if paid is None else paid, strict=True))
+    kept = kept_of(outcome, sizes)
+    evaluator, best, at = Evaluator(case), np.inf, None
+    for choice in itertools.product(sizes, repeat=len(kept)):
+        design = np.full(case.n_design, sizes[0])
+        design[kept] = choice
+        if sum(price[size] for size in design.tolist()) <= 3.5 + 1e-9:
+            value = evaluator.evaluate(design, gradient=False).objectives["G"]
+            if value < best:
+                best, at = value, design.tolist()
+    return best, at
+
+
+def kept_of(outcome, sizes):
+    """Members with half of the least size above 0, or more, in the continuous optimum."""
+    continuous = run_session(replace(outcome.case, members=tuple(replace(g, sizes=()) for g in outcome.case.members)))
+    kept = np.flatnonzero(continuous.alpha >= 0.5 * min(size for size in sizes if size))
+    assert len(kept) == outcome.sizes.members
+    assert continuous.objectives["G"] == pytest.approx(outcome.sizes.continuous, rel=1e-12)
+    return kept
+
+
+@pytest.mark.parametrize("few", [1000, 10], ids=["all choices", "branch and bound"])
+def test_the_sizes_of_a_run_are_the_best_of_all_choices(few, tmp_path, monkeypatch):
+    monkeypatch.setattr("mdstopo.session.size_search.FEW", few)
+    case = case_with("[0, 0.4, 1]")
+    outcome = run_session(case, path=tmp_path / "r.h5")
+    best, at = brute(case, outcome, [0.0, 0.4, 1.0])
+    assert outcome.status is RunStatus.CONVERGED
+    assert outcome.objectives["G"] == pytest.approx(best, rel=1e-9)
+    assert outcome.alpha.tolist() == at
+    assert outcome.sizes.continuous < best
+    assert outcome.sizes.exhaustive == (few > 243)
+    assert outcome.initial_objectives["G"] > outcome.objectives["G"]
+    assert sum(outcome.sizes.sizes["straps"].values()) == case.n_design
+    view = read_result(tmp_path / "r.h5")
+    assert view.finished
+    assert view.alpha.tolist() == at
+    assert "worse than the continuous optimum" in view.reason
+    assert view.array("catalogue/continuous") == outcome.sizes.continuous
+
+
+def test_prices_bound_the_choice(tmp_path):
+    case = case_with("{sizes: [0, 0.4, 1], prices: [0, 0.6, 1]}")
+    outcome = run_session(case)
+    best, at = brute(case, outcome, [0.0, 0.4, 1.0], [0.0, 0.6, 1.0])
+    assert outcome.objectives["G"] == pytest.approx(best, rel=1e-9)
+    assert outcome.alpha.tolist() == at
+
+
+def test_members_of_one_alpha_have_one_size():
+    case = case_with("[0, 0.3, 1]", replace=[("design: {initial", "design: {shared: [straps], initial")])
+    outcome = run_session(case)
+    assert set(outcome.alpha.tolist()) == {0.3}
+    assert outcome.sizes.members == 1
+
+
+def test_a_stopped_choice_is_kept_and_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    case = case_with("[0, 0.4, 1]")
+    whole = run_session(case, path=tmp_path / "whole.h5")
+    told, asked = [], []
+
+    def stop():
+        asked.append(0)
+        return bool(told) and len(asked) - told[0] > 1
+
+    def notify(sentence):
+        if sentence.startswith("choosing sizes"):
+            told.append(len(asked))
+
+    part = run_session(case, path=tmp_path / "parts.h5", stop_requested=stop, notify=notify)
+    assert part.status is RunStatus.INTERRUPTED
+    view = read_result(tmp_path / "parts.h5")
+    assert not view.finished
+    assert np.array_equal(view.alpha, part.alpha)
+    assert set(part.alpha.tolist()) <= {0.0, 0.4, 1.0}
+    assert len(view.array("catalogue/search/open_bound")) > 0
+    resumed = run_session(case, path=tmp_path / "parts.h5", resume=True)
+    assert np.array_equal(resumed.alpha, whole.alpha)
+    assert resumed.objectives == whole.objectives
+    assert resumed.sizes == whole.sizes
+
+
+def test_a_run_without_any_choice_that_fits_says_so():
+    outcome = run_session(case_with("[0.5, 0.7, 1]"))
+    assert outcome.status is RunStatus.FAILED
+    assert outcome.reason.startswith("no choice of sizes keeps the constraints")
+
+
+TWO = "combine: {weights: {G: 1, H: 1}}\nobjectives:\n  H: {response: energy, over_time: mean}"
+FIXED = [("law: {", "design: false, law: {"), ("  - {volume: all, limit: 3.5}", "  []")]
+NARROW = [("lower: 0,", "lower: 0.001, upper: 0.3,"), ("initial: 0.3", "initial: 0.1")]
+PLACE = "design.catalogue.straps"
+MISTAKES = [
+    ("[0.4, 0.2]", (), f"{PLACE}[1]", "found 0.2, allowed is > 0.4, the size before it"),
+    ("[0, 0.4]", NARROW, f"{PLACE}[1]", "0.001 to 0.3"),
+    ("{sizes: [0, 1], prices: [0]}", (), f"{PLACE}.prices", "found 1 prices, needed is one for each of 2 sizes"),
+    ("{sizes: [0, 1], prices: [2, 1]}", (), f"{PLACE}.prices[1]", "allowed is at least 2"),
+    ("[0, 1]", FIXED, PLACE, "design: false"),
+    ("[0, 1]", [("objectives:", TWO)], "design.catalogue", "are several objectives"),
+    (
+        "[0, 1]",
+        [("lower: 0,", "lower: 0.1, power: 0.5,")],
+        f"{PLACE}[0]",
+        "found 0, allowed is > 0 where power is below",
+    ),
+]
+
+
+@pytest.mark.parametrize(("sizes", "changes", "place", "words"), MISTAKES, ids=range(len(MISTAKES)))
+def test_mistakes_are_told_with_their_place(sizes, changes, place, words):
+    with pytest.raises(CaseError) as error:
+        case_with(sizes, replace=changes)
+    assert any(each.path_key == place and words in each.message for each in error.value.mistakes), error.value
+
+
+def test_lengths_that_vary_have_no_catalogue():
+    moving = "bed: {body: truck, movable: {within: {line: {from: [-1, -1], to: [1, -1]}}},"
+    case = case_with("[0, 1]", replace=[("bed: {body: truck,", moving), ("damping: 20}", "damping: 20}, cost: length")])
+    with pytest.raises(CaseError, match="cost a length that varies"):
+        run_session(case)
