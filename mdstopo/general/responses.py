@@ -457,7 +457,7 @@ def point_value(model, j, q, v, a, bars):
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
-    return _motion(model, j, model.response[j, COMPONENT], q, v, a, bars)
+    return motion_component(model, j, model.response[j, COMPONENT], q, v, a, bars)
 
 
 @kernel
@@ -531,7 +531,7 @@ def joint_moment_value(model, j, q, lam, bars, row_bar):
 
 
 @kernel
-def _motion(model, j, component, q, v, a, bars):
+def motion_component(model, j, component, q, v, a, bars):
     """One component of the motion of the point that response j is about.
 
     model: the compiled scene.
@@ -543,7 +543,8 @@ def _motion(model, j, component, q, v, a, bars):
     body = model.response[j, BODY]
     reference = model.response[j, REFERENCE]
     order = model.response[j, ORDER]
-    return point_motion(model, order, component, model.response_par[j], body, reference, q, v, a, bars)
+    at = model.response_par[j]
+    return point_motion(model, order, component, at, at[dimensions(model) :], body, reference, q, v, a, bars)
 
 
 @kernel
@@ -630,7 +631,7 @@ def motion_across(model, j, q, v, a, bars):
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
-    return _motion(model, j, ACROSS, q, v, a, bars)
+    return motion_component(model, j, ACROSS, q, v, a, bars)
 
 
 @kernel
@@ -670,8 +671,8 @@ def motion_components(model, j, q, v, a, out):
     out (2,): the components along x and y.
     """
     spare = np.zeros((3, v.shape[0]))
-    out[0] = _motion(model, j, X, q, v, a, spare)
-    out[1] = _motion(model, j, Y, q, v, a, spare)
+    out[0] = motion_component(model, j, X, q, v, a, spare)
+    out[1] = motion_component(model, j, Y, q, v, a, spare)
 
 
 @kernel
