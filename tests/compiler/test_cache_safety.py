@@ -7,6 +7,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +111,7 @@ def test_a_kernel_in_a_new_folder_changes_the_key(tmp_path: Path) -> None:
     assert store._sources(tmp_path) == ["./jit.py", "new/deep/kernels.py"]
 
 
+@cache
 def imports(path: Path) -> set[str]:
     """Modules that a source file imports, and what it takes from them."""
     found = set()
