@@ -97,6 +97,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "space/test_contacts_in_space.py": ("implicit", "collision", "gradients_through_contacts"),
     "space/test_driven_bodies.py": ("gradients_with_driven",),
     "space/test_gauss_in_space.py": ("windows", "gradient", "slopes", "tilted", "energy", "thousands"),
+    "space/test_gradients_in_space.py": ("",),
     "space/test_grids_of_springs.py": ("without_the_kernels",),
     "space/test_implicit_steps.py": ("",),
     "space/test_law_parameters.py": ("",),
