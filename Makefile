@@ -2,7 +2,8 @@
 #
 #   make run                      set up .venv, optimise cases/fig6.yaml, write results/fig6.h5
 #   make test                     set up .venv with the tools of development, run the tests
-#   make test-lowest              the same with the lowest versions of dependencies that pyproject.toml allows
+#   make test-all                 the thorough tests, too (tests/tiers.py): some 20 minutes
+#   make test-lowest              all of them with the lowest versions of dependencies that pyproject.toml allows
 #   make test-numba               kernels, gradients and warm starts with the oldest, a middle and the newest Numba
 #   make lint, make types         ruff, and who may import whom; mypy
 #   make docs                     the documentation, into site/index.html
@@ -38,10 +39,10 @@ PEERS_PYTHON ?= $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test test-lowest test-numba lint types docs reproduce gallery bench peers readme wheel clean
+.PHONY: help run test test-all test-lowest test-numba lint types docs reproduce gallery bench peers readme wheel clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,16p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,17p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -76,6 +77,9 @@ reproduce: $(VENV)/.ready-plot
 	$(BIN)/python -m reproduce
 
 test: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile -m 'not thorough' $(TESTS)
+
+test-all: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
 
 # What a plain installation, pictures and a cluster need, each at its lower bound; the tools of development as they are.

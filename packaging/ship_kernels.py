@@ -1,10 +1,12 @@
 """Machine code for the wheel: `python packaging/ship_kernels.py FOLDER` compiles what cases of every kind call.
 
 For each kind of processor in `compiler.store.PROCESSORS` that this one can stand for, the commands below are run with
-an empty cache, and what they have compiled is put into FOLDER, with a manifest that says of which sources it is. A
-wheel built with MDSTOPO_KERNELS=FOLDER carries it (setup.py); `make wheel` does both.
+an empty cache, and what they have compiled is put into FOLDER, with a manifest that says of which sources it is. An
+entry that none of them calls is a mistake. A wheel built with MDSTOPO_KERNELS=FOLDER carries it (setup.py); `make
+wheel` does both, and `python packaging/try_wheel.py` tells whether what it brings is enough.
 """
 
+import ast
 import json
 import os
 import shutil
@@ -21,8 +23,13 @@ from mdstopo.case.shipped import names
 from mdstopo.cli.new import templates
 from mdstopo.compiler.store import MANIFEST, PROCESSORS, SETTINGS, digest_of_sources, layout
 
-#: small problems, one of each kind (`make gallery`)
-GALLERY = Path(__file__).resolve().parent.parent / "gallery"
+HERE = Path(__file__).resolve().parent
+PACKAGE = HERE.parent / "mdstopo"
+#: small problems, one of each kind (`make gallery`), and those that have what these have not
+GALLERY, KINDS = HERE.parent / "gallery", HERE / "kinds"
+#: methods of differentiation that go with variables, and one that does not
+EXACT = ("--method", "adjoint", "--method", "direct", "--history")
+HELD = ("--method", "adjoint", "--method", "constant_load")
 #: options that keep every run short
 SHORT = ("--set", "optimizer.max_iterations=1", "--overwrite", "--quiet")
 #: members of a scene whose kernels are those of many variables
@@ -51,7 +58,49 @@ def commands(folder: Path) -> list[list[str]]:
         ["run", "mechanism.yaml", "--set", "solver.settle=true", *SHORT],
         ["check", "mooring", "--set", "solver.settle=true", "--quiet"],
         ["bound", "isolator", "--quiet"],
+        ["fit", str(KINDS / "fit.yaml"), "--overwrite", "--quiet"],
+        ["run", str(KINDS / "priced.yaml"), "--set", "optimizer.max_iterations=20", "--overwrite", "--quiet"],
     ]
+    return found + of_kinds()
+
+
+def of_kinds() -> list[list[str]]:
+    """Every method of differentiation with every integrator that goes with it, in a plane and in space."""
+    found = []
+    for integrator in INTEGRATORS:
+        chosen = ("--set", f"solver.integrator={integrator}", "--set", "solver.step=0.002")
+        others = (*HELD, "--method", "iterative") if integrator == "generalized_alpha" else HELD
+        found += [
+            ["gradient", "fig6", *chosen, *EXACT, "--error-estimate", "--quiet"],
+            ["gradient", "fig6", *chosen, *others, "--quiet"],
+        ]
+        for name in ("planar", "space") if integrator != "gauss" else ():
+            file = str(KINDS / f"{name}.yaml")
+            found += [
+                ["run", file, *chosen, *SHORT],
+                ["check", file, *chosen, "--quiet"],
+                ["gradient", file, *chosen, *EXACT, "--error-estimate", "--quiet"],
+                ["gradient", file, *chosen, *others, "--set", "design.variables={}", "--quiet"],
+                ["simulate", file, *chosen, "--overwrite", "--quiet"],
+            ]
+    free = str(KINDS / "free.yaml")
+    for integrator in ("gauss", "runge_kutta"):
+        chosen = ("--set", f"solver.integrator={integrator}")
+        found += [["run", free, *chosen, *SHORT], ["gradient", free, *chosen, *EXACT, "--quiet"]]
+    return [*found, ["gradient", free, *HELD, "--quiet"]]
+
+
+def without_code(folder: Path) -> list[str]:
+    """Entries of the package, module and name, of which a folder has no machine code."""
+    found = []
+    for source in sorted(PACKAGE.rglob("*.py")):
+        module = ".".join(("mdstopo", *source.relative_to(PACKAGE).with_suffix("").parts))
+        for each in ast.parse(source.read_text(encoding="utf-8")).body:
+            if not isinstance(each, ast.FunctionDef):
+                continue
+            marks = {mark.id for mark in each.decorator_list if isinstance(mark, ast.Name)}
+            if marks & {"entry", "vector_entry"} and not any(folder.glob(f"{module}.{each.name}-*.code")):
+                found.append(f"{module}.{each.name}")
     return found
 
 
@@ -77,7 +126,7 @@ def compiled(processor: str, destination: Path) -> list[str]:
         for path in sorted(kept.iterdir()):
             if path.suffix in (".code", ".compiled") or path.name.startswith("ready-"):
                 shutil.copyfile(path, target / path.name)
-    return failed
+    return failed + [f"{processor}: no command has called {each}" for each in without_code(target)]
 
 
 def main(destination: Path) -> int:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tiers import mark, without_test
+
 _WHERE = "import importlib.util as u; found = u.find_spec('mdstopo'); print(found and found.origin or '')"
 
 
@@ -24,3 +26,13 @@ def pytest_configure(config: pytest.Config) -> None:
             f"{sys.executable} has {found or 'no mdstopo'} installed, not {own}: "
             f"install this checkout (pip install --editable .), or set PYTHONPATH={own.parent.parent}"
         )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what `make test` leaves out; an entry for it that names no test is a mistake."""
+    mark(items)
+    if config.args == config.getini("testpaths"):
+        lost = without_test([item.nodeid for item in items])
+        if lost:
+            raise pytest.UsageError(f"tests/tiers.py has entries without a test: {', '.join(lost)}")

@@ -9,10 +9,11 @@ from typing import Any
 
 import yaml
 
-from mdstopo import __version__
+from mdstopo import __version__, load_case
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.shipped import names
 from mdstopo.cli.new import templates
+from mdstopo.scene.refusals import refusals
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -62,3 +63,19 @@ def test_kernels_are_shipped_for_every_case_template_gallery_problem_and_integra
     assert {str(path) for path in (ROOT / "gallery").glob("*.yaml")} <= run
     said = {word for words in commands for word in words}
     assert {f"solver.integrator={name}" for name in INTEGRATORS} <= said
+
+
+def test_the_kinds_of_cases_that_kernels_are_shipped_for_can_be_computed() -> None:
+    kinds = sorted((ROOT / "packaging/kinds").glob("*.yaml"))
+    assert len(kinds) > 3
+    for path in kinds:
+        assert refusals(load_case(path)) == [], path
+
+
+def test_an_entry_that_no_command_has_called_is_named(tmp_path: Path) -> None:
+    without_code = runpy.run_path(str(ROOT / "packaging/ship_kernels.py"))["without_code"]
+    entries = without_code(tmp_path)
+    assert len(entries) > 40
+    assert {"mdstopo.general.direct.push", "mdstopo.sensitivity.candidate_prices.price_candidates"} <= set(entries)
+    (tmp_path / "mdstopo.general.direct.push-0123.code").touch()
+    assert set(entries) - set(without_code(tmp_path)) == {"mdstopo.general.direct.push"}

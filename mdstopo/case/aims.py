@@ -22,7 +22,8 @@ class Response(Value):
     kind: the word of its record (`case.responses`). Fields that a kind does not use are None.
     at_local is in body coordinates of `body`; component: x | y | norm, in space also z. numbers: up to four of
     its own for its kernels; of a tilt: its axis, a unit vector in body coordinates. dimension: of the
-    case, whose responses have records of their own.
+    case, whose responses have records of their own. since: of a displacement, the place that it counts from,
+    stated | settled.
     """
 
     kind: str
@@ -34,6 +35,7 @@ class Response(Value):
     joint: str | None = None
     numbers: tuple[float, ...] = ()
     dimension: int = 2
+    since: str | None = None
 
 
 @frozen

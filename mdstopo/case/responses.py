@@ -6,6 +6,7 @@ How a response is computed stands in `mdstopo.general`, in what its record names
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from mdstopo.case.aims import Response
@@ -56,6 +57,17 @@ class ResponseKind(Value):
 RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
 OF_BODY = Key("body", BODY, "whose motion it is", required=True)
 _COMPONENTS = explained({"x": "along x", "y": "along y", "norm": "the length of the vector"})
+SINCE = Key(
+    "since",
+    explained(
+        {
+            "stated": "where the case has it at the start",
+            "settled": "where it is at rest, with each design anew; needs `solver: {settle: true}`",
+        }
+    ),
+    "the place that a displacement counts from",
+    default="stated",
+)
 _AT_POINT = Record(
     "the motion of a point",
     (
@@ -85,6 +97,11 @@ _OF_JOINT = Record(
 )
 
 
+def with_since(record: Record) -> Record:
+    """The keys of a point's motion, and what a displacement counts from."""
+    return replace(record, keys=(*record.keys, SINCE))
+
+
 def sees_itself(keys: Fields, reading: Reading) -> bool:
     """Whether the body is its own observer, which is a mistake."""
     if keys["body"] != keys["relative_to"]:
@@ -104,7 +121,10 @@ def _at_point(word: str, keys: Fields, frames: Frames, reading: Reading) -> Resp
     at = frames.local_point(keys["body"], keys["at"], keys["frame"], inside(keys.path, "at"), reading)
     if at is BAD:
         return None
-    return Response(word, body=keys["body"], at_local=at, relative_to=keys["relative_to"], component=keys["component"])
+    return Response(
+        word, body=keys["body"], at_local=at, relative_to=keys["relative_to"], component=keys["component"],
+        since=keys.get("since"),
+    )  # fmt: skip
 
 
 def _of_group(word: str, keys: Fields, _: Frames, __: Reading) -> Response:
@@ -116,9 +136,10 @@ def _of_joint(word: str, keys: Fields, _: Frames, __: Reading) -> Response:
 
 
 def _point(word: str, unit: str, order: int) -> ResponseKind:
+    keys = _AT_POINT if order else with_since(_AT_POINT)
     return ResponseKind(
-        word=word, doc="of a point", unit=unit, kernels="mdstopo.general.responses:OF_POINT", keys=_AT_POINT,
-        made=_at_point, order=order, is_position=order == 0, of_point=True, depends_on_rate=order > 0,
+        word=word, doc="of a point", unit=unit, kernels="mdstopo.general.responses:OF_POINT", keys=keys, made=_at_point,
+        order=order, is_position=order == 0, of_point=True, depends_on_rate=order > 0,
     )  # fmt: skip
 
 

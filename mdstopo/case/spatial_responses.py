@@ -9,7 +9,7 @@ from mdstopo.case.joints.spatial_keys import DIRECTION, TRIPLE
 from mdstopo.case.kinds import explained
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
-from mdstopo.case.responses import OF_BODY, RELATIVE, RESPONSES, ResponseKind, sees_itself
+from mdstopo.case.responses import OF_BODY, RELATIVE, RESPONSES, ResponseKind, sees_itself, with_since
 from mdstopo.case.rotations import unit
 from mdstopo.case.schema_frame import FRAME
 from mdstopo.case.start_geometry import Frames
@@ -73,9 +73,9 @@ def _at_point(word: str, keys: Fields, frames: Frames, reading: Reading) -> Resp
     at = frames.local_point(keys["body"], keys["at"], keys["frame"], inside(keys.path, "at"), reading)
     if at is BAD:
         return None
-    observer, component = keys["relative_to"], keys["component"]
+    observer, component, since = keys["relative_to"], keys["component"], keys.get("since")
     return Response(
-        word, body=keys["body"], at_local=at, relative_to=observer, component=component, dimension=3
+        word, body=keys["body"], at_local=at, relative_to=observer, component=component, dimension=3, since=since
     )  # fmt: skip
 
 
@@ -92,7 +92,8 @@ def _of_others(word: str) -> ResponseKind:
 
 
 def _point(word: str) -> ResponseKind:
-    return replace(RESPONSES[word], keys=_AT_POINT, made=_at_point)
+    planar = RESPONSES[word]
+    return replace(planar, keys=_AT_POINT if planar.order else with_since(_AT_POINT), made=_at_point)
 
 
 def _turn(word: str, unit: str, order: int) -> ResponseKind:

@@ -25,4 +25,6 @@ def words(response: Response) -> str:
             parts.append(f"{key} {value}")
     if response.relative_to not in (None, "ground"):
         parts.append(f"relative to {response.relative_to}")
+    if response.since == "settled":
+        parts.append("since it has settled")
     return " ".join(parts)

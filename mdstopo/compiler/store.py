@@ -19,7 +19,8 @@ from mdstopo.installed import version_of
 #: folders and modules of the package that hold no kernels and that no kernel takes a number from; `tests/compiler`
 #: looks after that
 WITHOUT_KERNELS = (
-    "bench", "cli", "finalize", "fit", "front", "plots", "report", "session", "store",
+    "bench", "cli", "finalize", "fit", "front", "limiting", "plan", "plots", "report", "robust", "session", "starts",
+    "store", "stress", "workers",
     "api.py", "functions.py", "jax.py", "openmdao.py", "shown.py", "torch.py",
 )  # fmt: skip
 #: the folder of the package with machine code that came with it, a folder for a kind of processor, and what it is of

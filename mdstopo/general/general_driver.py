@@ -437,11 +437,15 @@ class GeneralDriver:
         if gradient:
             out[:] = self._integral_gradient
             if self.start is not None:
+                if j in self.start.since:
+                    self.start_vjp += self.start.since.integral_cotangent(j, integral, count)
                 self.start.vjp(self.start_vjp, out)
         return total
 
-    def start_from(self, q: FloatArray) -> None:
-        """Take other positions q (n,) at the start."""
+    def start_from(self, q: FloatArray, response_par: FloatArray | None = None) -> None:
+        """Take other positions q (n_q,) at the start, and other numbers of responses; None: those of the scene."""
+        numbers = self.scene.model.response_par if response_par is None else response_par
+        self._model = self._model._replace(response_par=numbers)
         self._packed = self.ints, self.floats = self.pack(self._model._replace(q0=q))
 
     def start_slopes(self) -> FloatArray:

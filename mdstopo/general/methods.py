@@ -53,12 +53,30 @@ def differentiate(
                     if stopped >= 0:
                         message = FALLBACK.format(float(driver.states()[0][stopped]))
                         return differentiate(driver, "direct", alpha, looked, across)[0], message
+                    _add_since_settled(driver, j, part, aside, integral, count, own)
                     out += share * own
             if integral:
                 gradients[j, r] *= rows[j, r, RATE]
             elif reduction == "max_abs":
                 gradients[j, r] *= rows[j, r, SIGN]
     return gradients, message
+
+
+def _add_since_settled(
+    driver: "GeneralDriver", j: int, row: FloatArray, aside: bool, integral: int, count: int, out: FloatArray
+) -> None:
+    """What a displacement that counts from where the scene has settled has of that place's derivatives, out (N + P,).
+
+    driver: of the motion that was differentiated. j, row: the response, and its row of `extremes`.
+    aside: whether the component across a norm's vector is meant.
+    integral: 0 where the row is meant, 1 for the integral of the response, 2 for that of its square.
+    count: how many steps the motion has.
+    """
+    if driver.start is None or j not in driver.start.since:
+        return
+    since = driver.start.since
+    pulled = since.integral_cotangent(j, integral, count) if integral else since.row_cotangent(j, row, aside, count)
+    driver.start.vjp(pulled, out)
 
 
 def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, count: int) -> FloatArray:
@@ -100,6 +118,7 @@ def _held_at(driver: "GeneralDriver", j: int, row: FloatArray, count: int) -> Fl
     z = np.zeros(size)
     z[moving] = np.linalg.pinv(matrix[np.ix_(moving, moving)], rcond=DROPPED).T @ right[moving]
     hold(*arguments, z[:n].copy(), matrix, right, driver.padded, out, driver.work)
+    _add_since_settled(driver, j, row, False, 0, count, out)
     return out
 
 
@@ -117,4 +136,7 @@ def histories(driver: "GeneralDriver", alpha: FloatArray, j: int) -> tuple[Statu
         np.zeros(0), True, driver.room, driver.room_ints, driver.member_state, driver.padded, lines,
         driver.start_slopes(), driver.work,
     )  # fmt: skip
+    if driver.start is not None and j in driver.start.since:
+        for line, q in zip(lines[0], driver.states()[1], strict=False):
+            driver.start.vjp(driver.start.since.cotangent(j, q), line)
     return Status.OK, driver.states()[0][: count + 1].copy(), lines[0]

@@ -152,7 +152,8 @@ class GeneralModel(NamedTuple):
         IndexArray, Field("n_response, 6", "kind, body, reference, component, order in time, group or joint")
     ]
     response_par: Annotated[
-        FloatArray, Field("n_response, n_number", "a point or axis of the body, then numbers of its own")
+        FloatArray,
+        Field("n_response, n_number", "a point or axis of the body, then numbers of its own, or what it counts from"),
     ]
     contact_pair: Annotated[IndexArray, Field("n_contact", "the pair of edge (or surface) and point")]
     contact: Annotated[FloatArray, Field("n_contact, n_surface", "see `mechanics.contact`, `spatial_contacts`")]

@@ -82,4 +82,19 @@ def slopes(
         *driver.steps_arguments(seen.count), np.arange(len(out)), seen.states, seen.who, shifted, apart, False,
         driver.room, driver.room_ints, driver.member_state, padded, out, driver.start_slopes(), driver.work,
     )  # fmt: skip
+    if driver.start is not None:
+        _add_since_settled(driver, seen, out[..., : length - len(numbers)])
     return out[..., len(driver.alpha) :]
+
+
+def _add_since_settled(driver: GeneralDriver, seen: Observed, out: FloatArray) -> None:
+    """What displacements that count from where the scene has settled have of that place's derivatives.
+
+    out (R, K, N + P): added to.
+    """
+    assert driver.start is not None
+    q = driver.states()[1]
+    for j in range(len(out)):
+        if j in driver.start.since:
+            for own, state in zip(out[j], seen.states, strict=True):
+                driver.start.vjp(driver.start.since.cotangent(j, q[state]), own)

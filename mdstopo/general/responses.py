@@ -499,7 +499,7 @@ def point_value(model, j, q, v, a, bars):
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
-    return _motion(model, j, model.response[j, COMPONENT], q, v, a, bars)
+    return motion_component(model, j, model.response[j, COMPONENT], q, v, a, bars)
 
 
 @kernel
@@ -573,7 +573,7 @@ def joint_moment_value(model, j, q, lam, bars, row_bar):
 
 
 @kernel
-def _motion(model, j, component, q, v, a, bars):
+def motion_component(model, j, component, q, v, a, bars):
     """One component of the motion of the point that response j is about.
 
     model: the compiled scene.
@@ -585,7 +585,8 @@ def _motion(model, j, component, q, v, a, bars):
     body = model.response[j, BODY]
     reference = model.response[j, REFERENCE]
     order = model.response[j, ORDER]
-    return point_motion(model, order, component, model.response_par[j], body, reference, q, v, a, bars)
+    at = model.response_par[j]
+    return point_motion(model, order, component, at, at[dimensions(model) :], body, reference, q, v, a, bars)
 
 
 @kernel
@@ -672,7 +673,7 @@ def motion_across(model, j, q, v, a, bars):
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
-    return _motion(model, j, ACROSS, q, v, a, bars)
+    return motion_component(model, j, ACROSS, q, v, a, bars)
 
 
 @kernel
@@ -712,8 +713,8 @@ def motion_components(model, j, q, v, a, out):
     out (2,): the components along x and y.
     """
     spare = np.zeros((3, v.shape[0]))
-    out[0] = _motion(model, j, X, q, v, a, spare)
-    out[1] = _motion(model, j, Y, q, v, a, spare)
+    out[0] = motion_component(model, j, X, q, v, a, spare)
+    out[1] = motion_component(model, j, Y, q, v, a, spare)
 
 
 @kernel

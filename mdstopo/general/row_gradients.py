@@ -58,8 +58,10 @@ class RowGradients:
                 block.which[m] = j, aside
                 block.rows[m] = row
             driver.ready(f"pull_rows {len(part)}", driver.entry.rows_vjp, *self._arguments(count, block))
-            for (j, r, aside, share, _), own, start in zip(part, block.out, block.starts, strict=True):
+            for (j, r, aside, share, row), own, start in zip(part, block.out, block.starts, strict=True):
                 if driver.start is not None:
+                    if j in driver.start.since:
+                        start += driver.start.since.row_cotangent(j, row, bool(aside), count)
                     driver.start.vjp(start, own)
                 if aside and across is not None:
                     across[j, r] += share * own

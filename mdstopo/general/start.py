@@ -18,6 +18,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.general.model import COUNT, DESIGN, START
+from mdstopo.general.since_settled import SinceSettled
 from mdstopo.mechanics.joints.table import describe
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.bodies import distances
@@ -40,6 +41,8 @@ class SettledStart:
         self._design: bytes | None = None
         self.settled: Settled | None = None
         self.message = ""
+        #: what counts from there
+        self.since = SinceSettled(driver)
         self._refuse()
 
     def move(self) -> bool:
@@ -57,7 +60,7 @@ class SettledStart:
             self.message = found
             return False
         self.settled = found
-        driver.start_from(found.q)
+        driver.start_from(found.q, self.since.numbers_at(found.q) if self.since else None)
         self._design = design
         return True
 

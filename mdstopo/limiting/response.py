@@ -130,6 +130,8 @@ def _centred(system: System, response: Response) -> None:
 def _row(system: System, response: Response) -> Bounded:
     """The motion of the body's centre of mass, along the axes of a body that does not turn (else along global ones)."""
     assert response.body is not None
+    if response.since == "settled":
+        raise NoBoundError("it counts from where the scene has settled, which depends on the design")
     other = response.relative_to or GROUND
     angle = system.angles.get(other, 0.0)
     c, s = math.cos(angle), math.sin(angle)

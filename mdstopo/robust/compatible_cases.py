@@ -75,4 +75,4 @@ def _limited(row: VolumeRow | ResponseRow) -> tuple[object, ...]:
 def _seen(response: Response) -> tuple[object, ...]:
     """A response but for where on its body it is looked at."""
     of = response
-    return of.kind, of.body, of.relative_to, of.component, of.group, of.joint
+    return of.kind, of.body, of.relative_to, of.component, of.group, of.joint, of.since

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from mdstopo.case.errors import Mistake
 from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.case.model import Case, MemberGroup, VolumeRow
+from mdstopo.case.model import Case, MemberGroup, Response, ResponseRow, VolumeRow
 from mdstopo.case.words import number_text
 from mdstopo.scene.family import beyond_collocation, beyond_springs
 from mdstopo.scene.moving_volumes import moving_volumes
@@ -58,6 +58,20 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
         yield "solver.sensitivity", no_derivatives(case, solver.sensitivity)[1]
     for group in case.priced_groups:
         yield from _unpriced(case, group)
+    if not solver.settle:
+        for path, response in _looked_at(case):
+            if response.since == "settled":
+                yield f"{path}.response.{response.kind}.since", "settled needs `solver: {settle: true}`"
+
+
+def _looked_at(case: Case) -> Iterator[tuple[str, Response]]:
+    """All responses of a case, with the key path of what asks for them."""
+    yield from ((f"objectives.{each.name}", each.response) for each in case.objectives)
+    for i, row in enumerate(case.constraints):
+        if isinstance(row, ResponseRow):
+            yield f"constraints[{i}]", row.response
+    if case.fit is not None:
+        yield from ((f"fit.measured.{each.name}", each.response) for each in case.fit.series)
 
 
 def _unpriced(case: Case, group: MemberGroup) -> Iterator[tuple[str, str]]:

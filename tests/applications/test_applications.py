@@ -79,7 +79,6 @@ def test_tables_of_time_are_what_their_formulas_give() -> None:
         assert (DATA / name).read_text() == text, name
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", APPLICATIONS)
 def test_the_stored_design_keeps_its_limits_when_computed_a_hundred_times_finer(name: str) -> None:
     case = case_of(name)
@@ -93,7 +92,6 @@ def test_the_stored_design_keeps_its_limits_when_computed_a_hundred_times_finer(
         assert value == pytest.approx(coarse.objectives[objective], rel=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", APPLICATIONS)
 def test_the_stored_hand_design_has_the_parts_stated_keeps_all_limits_and_is_worse(name: str) -> None:
     case = case_of(name)
@@ -109,7 +107,6 @@ def test_the_stored_hand_design_has_the_parts_stated_keeps_all_limits_and_is_wor
     assert score(evaluate(fine, found, gradient=False)) < 0.98 * score(drawn)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", APPLICATIONS)
 def test_a_short_run_from_the_stated_start_makes_headway(name: str) -> None:
     case = case_of(name, **{"optimizer.max_iterations": SHORT.get(name, 10), "combine.weights": weights(name)})
@@ -125,7 +122,6 @@ def weights(name: str) -> dict[str, float]:
     return {objective.name: float(i == 0) for i, objective in enumerate(objectives)}
 
 
-@pytest.mark.slow
 def test_forces_that_are_written_out_again_agree_with_the_response() -> None:
     design = read_design(CASES / "designs" / "lander.txt", case_of("lander").n_design)
     for looked in ("struts", "crush"):
@@ -138,7 +134,6 @@ def test_forces_that_are_written_out_again_agree_with_the_response() -> None:
             assert own.max() == pytest.approx(found.constraints[i] + case.constraints[i].bound, rel=1e-3)
 
 
-@pytest.mark.slow
 def test_the_cartridges_of_the_lander_are_crushed_and_stay_so() -> None:
     case = case_of("lander")
     design = read_design(CASES / "designs" / "lander.txt", case.n_design)
@@ -153,7 +148,6 @@ def test_the_cartridges_of_the_lander_are_crushed_and_stay_so() -> None:
             assert np.all(far < 0.7 * group.length[there])
 
 
-@pytest.mark.slow
 def test_forces_in_space_that_are_written_out_again_agree_with_the_response() -> None:
     groups = ("struts_wl", "crush_er")
     rows = [
@@ -169,7 +163,6 @@ def test_forces_in_space_that_are_written_out_again_agree_with_the_response() ->
         assert own.max() == pytest.approx(found.constraints[i] + 1e4, rel=1e-3)
 
 
-@pytest.mark.slow
 def test_the_lander_on_a_slope_stops_no_softer_than_anything_can_and_all_its_legs_are_crushed() -> None:
     """Along the slope's normal the hull has 2.85 m/s to lose, and the travel of its centre of mass is at most that of
     the nozzle and what the tilt adds: v^2 / 2 s bounds the acceleration of every design."""
@@ -208,7 +201,6 @@ def olc(speed: float, deceleration: float) -> float:
     return float(speed**2 / 2.0 / (0.3 + speed**2 / (2.0 * deceleration) - speed * flight))
 
 
-@pytest.mark.slow
 def test_the_belt_stops_the_chest_no_softer_than_anything_can_and_its_torsion_bars_give_way() -> None:
     """Of a rectangular pulse a with speed v somebody who moves by D in the car feels at least a / (1 + 2 D a / v^2)."""
     case = case_of("occupant")
@@ -223,7 +215,6 @@ def test_the_belt_stops_the_chest_no_softer_than_anything_can_and_its_torsion_ba
         assert strokes(case, design, group, "straight")[there].max() > law.gap + 2.0 * law.force / law.stiffness
 
 
-@pytest.mark.slow
 def test_a_law_that_is_not_written_out_is_refused() -> None:
     case = load_case(CASES / "mooring.yaml")
     group = next(each for each in case.members if each.name == "water_along")

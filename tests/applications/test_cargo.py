@@ -145,7 +145,6 @@ def test_the_code_accepts_the_design(design: str) -> None:
         assert against_tipping(UNIT, chains, side) > y * UNIT.arm
 
 
-@pytest.mark.slow
 def test_forces_written_out_again_agree_with_the_response_in_space() -> None:
     case = case_of()
     design = read_design(CASES / "designs" / "cargo.txt", case.n_design)

@@ -183,7 +183,6 @@ def test_the_highest_peak_between_looks():
     assert highest(np.cos(times), -np.sin(times), 2.0)[1] is False
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["jax", "diffrax", "casadi", "scipy"])
 @pytest.mark.parametrize("kind", ["fig6", "interior"])
 def test_installed_peers_compute_the_same(name, kind):
@@ -198,7 +197,6 @@ def test_installed_peers_compute_the_same(name, kind):
     assert found.gradient_error < 1e-5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["exudyn", "mujoco"])
 def test_installed_peers_run_forward(name):
     if PEERS[name].missing():

@@ -314,7 +314,6 @@ def wait_for_checkpoint(process: "subprocess.Popen[str]", path: Path) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.slow
 def test_an_interrupted_run_is_status_3_and_its_command_resumes_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -398,7 +397,6 @@ def test_what_saved_nothing_is_interrupted_without_a_command(
             run_group(["run", "probe.yaml", *words])
 
 
-@pytest.mark.slow
 def test_workers_end_when_their_parent_is_killed() -> None:
     sets = [word for pair in ENDLESS for word in ("--set", pair)]
     process = begin("run", "probe.yaml", "--starts", "2", "--workers", "2", *sets)

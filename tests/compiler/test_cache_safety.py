@@ -7,6 +7,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +111,7 @@ def test_a_kernel_in_a_new_folder_changes_the_key(tmp_path: Path) -> None:
     assert store._sources(tmp_path) == ["./jit.py", "new/deep/kernels.py"]
 
 
+@cache
 def imports(path: Path) -> set[str]:
     """Modules that a source file imports, and what it takes from them."""
     found = set()
@@ -130,6 +132,23 @@ def test_folders_outside_the_key_have_no_kernels_and_give_kernels_nothing() -> N
             assert not compiles, path
         elif compiles:
             assert not [name for name in taken for place in outside if f"{name}.".startswith(f"{place}.")], path
+
+
+def test_nothing_that_kernels_are_made_from_imports_a_folder_outside_the_key() -> None:
+    taken: dict[str, set[str]] = {}
+    for path in PACKAGE.glob("**/*.py"):
+        name = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+        taken[name] = imports(path)
+    reached: set[str] = set()
+    ahead = [name for name, found in taken.items() if "mdstopo.compiler.jit" in found]
+    assert len(ahead) > 50
+    while ahead:
+        name = ahead.pop()
+        if name not in reached:
+            reached.add(name)
+            ahead += [each for each in taken[name] if each in taken]
+    folders = {name for name in store.WITHOUT_KERNELS if not name.endswith(".py")}
+    assert sorted(name for name in reached if name.split(".")[1:2] and name.split(".")[1] in folders) == []
 
 
 def test_folders_of_other_sources_go_when_they_are_old_or_many(tmp_path: Path) -> None:

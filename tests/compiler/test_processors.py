@@ -10,7 +10,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from mdstopo import evaluate
 from tests.engine.scenes import FEATURES, random_design, random_scene, read
@@ -59,14 +58,12 @@ def differences(count: int) -> tuple[list[float], list[float]]:
     return apart["value"], apart["gradient"]
 
 
-@pytest.mark.slow
 def test_a_processor_without_wide_vectors_and_fused_products_computes_the_same_to_rounding() -> None:
     values, gradients = differences(FEW)
     assert len(values) > FEW / 2
     assert max(*values, *gradients) <= NEAR
 
 
-@pytest.mark.slow
 def test_the_same_processor_computes_the_same_to_the_bit_in_another_process() -> None:
     other = elsewhere(FEW, **{name: os.environ[name] for name in STATED & os.environ.keys()})
     assert other == [found(seed) for seed in range(FEW)]

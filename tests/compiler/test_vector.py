@@ -203,7 +203,6 @@ def test_a_number_lost_anywhere_is_seen(bad):
     assert _difference(lost, y, weight, 2) == 2.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "narrow",
     [{"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}, {"NUMBA_ENABLE_AVX": "0"}],

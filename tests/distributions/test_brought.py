@@ -161,7 +161,6 @@ def mdstopo(folder: Path, *words: str, status: int = 0, known: bool = True) -> s
     return done.stdout if status == 0 else done.stdout + done.stderr
 
 
-@pytest.mark.slow
 def test_gradients_with_a_law_and_a_response_from_elsewhere_are_differences(folder: Path) -> None:
     for integrator in ("runge_kutta", "generalized_alpha"):
         step = ["--set", "solver.step=0.001"] if integrator == "generalized_alpha" else []
@@ -182,7 +181,6 @@ def test_gradients_with_a_law_and_a_response_from_elsewhere_are_differences(fold
             assert methods[method]["variables"]["G"]["most"] != [0.0]
 
 
-@pytest.mark.slow
 def test_a_run_and_a_resumed_one_end_in_the_same_design(folder: Path) -> None:
     mdstopo(folder, "run", "case.yaml", "--out", "whole.h5", "-q")
     mdstopo(folder, "run", "case.yaml", "--out", "parts.h5", "-q", "--set", "optimizer.max_iterations=2")

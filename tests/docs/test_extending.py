@@ -47,7 +47,6 @@ def test_changes_are_made_where_their_surroundings_are() -> None:
             changed(text, block)
 
 
-@pytest.mark.slow
 def test_the_worked_examples_do_what_the_page_says(tmp_path: Path) -> None:
     copy = tmp_path / "project"
     ignored = shutil.ignore_patterns("__pycache__")

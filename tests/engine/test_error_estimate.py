@@ -41,7 +41,7 @@ def ratios(case, alpha, integrator, tolerance, exact):
     [
         ("gauss", (1e-4, 1e-6, 1e-8, 1e-10)),
         ("runge_kutta", (1e-4, 1e-6, 1e-8, 1e-10)),
-        pytest.param("generalized_alpha", (1e-4,), marks=pytest.mark.slow),
+        ("generalized_alpha", (1e-4,)),
     ],
 )
 def test_estimates_are_within_a_factor_of_ten_in_95_of_100_random_scenes(integrator, tolerances):

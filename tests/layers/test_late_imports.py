@@ -2,8 +2,8 @@
 
 import ast
 import re
-from collections.abc import Iterator
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -22,8 +22,10 @@ def listed() -> list[tuple[list[str], list[str]]]:
     ]
 
 
-def late() -> Iterator[Late]:
+@cache
+def late() -> tuple[Late, ...]:
     """File and module of each import inside a function of the package."""
+    found: list[Late] = []
     for path in sorted((ROOT / "mdstopo").rglob("*.py")):
         for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
@@ -31,9 +33,10 @@ def late() -> Iterator[Late]:
             for node in ast.walk(function):
                 file = path.relative_to(ROOT).as_posix()
                 if isinstance(node, ast.Import):
-                    yield from ((file, name.name) for name in node.names)
+                    found += [(file, name.name) for name in node.names]
                 elif isinstance(node, ast.ImportFrom):
-                    yield file, node.module or ""
+                    found.append((file, node.module or ""))
+    return tuple(found)
 
 
 def fits(found: Late, row: tuple[list[str], list[str]]) -> bool:
@@ -46,7 +49,7 @@ def test_every_import_inside_a_function_is_listed() -> None:
 
 
 def test_every_row_has_an_import_for_each_of_its_files_and_modules() -> None:
-    found = list(late())
+    found = late()
     unused = [
         name
         for files, modules in listed()

@@ -1,7 +1,5 @@
 """The largest force of many members is lowered although far more of them are equal than are looked at."""
 
-import pytest
-
 from mdstopo import optimize
 from mdstopo.case.reader import read_case
 
@@ -32,7 +30,6 @@ constraints:
 """
 
 
-@pytest.mark.slow
 def test_a_load_that_many_members_share_is_lowered() -> None:
     result = optimize(read_case(CASE))
     assert result.initial_objectives["load"] > 150.0
@@ -41,7 +38,6 @@ def test_a_load_that_many_members_share_is_lowered() -> None:
     assert result.constraints[1] <= 1e-6
 
 
-@pytest.mark.slow
 def test_where_more_members_share_the_largest_force_than_are_told_of_at_first_all_of_them_are_rows() -> None:
     """With sixty rows the run ends 9 % above: the steps raise members of which the model knows nothing."""
     text = CASE.replace("count: 10", "count: 18").replace("count: 22", "count: 40")

@@ -142,7 +142,6 @@ def evaluated(text: str) -> Evaluation:
     return evaluate(case, np.random.default_rng(1).uniform(0.05, 1.0, case.n_design))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("law", ["free_length: 0.6", "damping: 2"])
 def test_a_case_has_the_same_values_and_gradients_without_the_kernels_for_grids(
     monkeypatch: pytest.MonkeyPatch, law: str

@@ -219,13 +219,13 @@ def test_joints(j: int) -> None:
 @pytest.mark.parametrize("component", [0, 1, 4, 2])
 @pytest.mark.parametrize("of", ["point", "turn"])
 def test_responses(of: str, component: int, order: int) -> None:
-    at = np.array([0.3, -0.2, 0.5, 0.0, 0.0, 0.0])
+    at, since = np.array([0.3, -0.2, 0.5]), np.array([0.2, -0.1, 0.3])
 
     def response(order: int, q: np.ndarray, v: np.ndarray, a: np.ndarray, bars: np.ndarray | None = None) -> float:
         bars = np.zeros((3, N)) if bars is None else bars
         if of == "turn":
             return float(KERNELS.turn_motion(MODEL, order, component, 0, 1, q, v, a, bars))
-        return float(KERNELS.point_motion(MODEL, order, component, at, 0, 1, q, v, a, bars))
+        return float(KERNELS.point_motion(MODEL, order, component, at, since, 0, 1, q, v, a, bars))
 
     bars = np.zeros((3, N))
     value = response(order, Q, V, A, bars)
@@ -239,6 +239,17 @@ def test_responses(of: str, component: int, order: int) -> None:
         return response(order - 1, SPATIAL.retract(Q, t[0] * V + 0.5 * t[0] ** 2 * A), V + t[0] * A, A)
 
     assert value == pytest.approx(by_numbers(before, np.zeros(1))[0], rel=1e-5)
+
+
+def test_what_a_displacement_counts_from_is_taken_from_its_components() -> None:
+    at, since, scratch = np.array([0.3, -0.2, 0.5]), np.array([0.2, -0.1, 0.3]), np.zeros((3, N))
+
+    def seen(component: int, since: np.ndarray) -> float:
+        return float(KERNELS.point_motion(MODEL, 0, component, at, since, 0, 1, Q, V, A, scratch))
+
+    whole = np.array([seen(component, np.zeros(3)) for component in (0, 1, 4)])
+    same([seen(component, since) for component in (0, 1, 4)], whole - since)
+    assert seen(2, since) == pytest.approx(np.linalg.norm(whole - since), rel=1e-12)
 
 
 def test_a_tilt() -> None:

@@ -1111,7 +1111,7 @@ def transmitted(model, j, which, q, lam, by_lam, by_q):
 # Motion of points
 
 
-def point_motion(model, order, component, at, b, r, q, v, a, bars):
+def point_motion(model, order, component, at, before, b, r, q, v, a, bars):
     """Displacement, velocity or acceleration of a point of body b as seen from body r: a component or the norm.
 
     In:
@@ -1119,6 +1119,7 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
       order: of the derivative by time, 0 to 2.
       component: `components.X`, Y, NORM or ACROSS; in space X, Y, Z or NORM.
       at (D - T or more,): the point in the frame of b (m).
+      before (D - T or more,): the displacement from home that displacements count from, along the axes of r (m).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       bars (3, n): slopes by q, v, a, added to.

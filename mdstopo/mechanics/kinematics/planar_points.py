@@ -28,7 +28,7 @@ def turned(home, angle):
 
 
 @kernel
-def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
+def point_response(order, component, s, before, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
     """Displacement, velocity or acceleration of a point of body b as seen from body r: a component or the norm.
 
     The norm's slope is zero where the norm is.
@@ -38,6 +38,7 @@ def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, 
       component: X, Y or NORM; ACROSS: the norm, with the slopes of the component perpendicular to the vector, a quarter
         turn ahead.
       s (2,): the point in the frame of b (m).
+      before (2,): the displacement that displacements count from, along the axes of r (m).
       home_b, home_r (HOME,): where the observed body b and the observer's body r are at home.
       qb, vb, ab (3,): what b has moved since, its velocities and accelerations (m, rad and derivatives).
       qr, vr, ar (3,): the same of r; accelerations are read for ACCELERATION only.
@@ -76,8 +77,8 @@ def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, 
     gx = ca * yx + sa * yy
     gy = ca * yy - sa * yx
     if order == DISPLACEMENT:
-        gx = ca * since_x + sa * since_y + (ca_since * home_x + sa_since * home_y)
-        gy = ca * since_y - sa * since_x + (ca_since * home_y - sa_since * home_x)
+        gx = ca * since_x + sa * since_y + (ca_since * home_x + sa_since * home_y) - before[0]
+        gy = ca * since_y - sa * since_x + (ca_since * home_y - sa_since * home_x) - before[1]
     # the weights of the two components
     if component == X:
         value = gx
@@ -176,14 +177,14 @@ def angle_response(order, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
 
 
 @part
-def point_motion(model, order, component, at, b, r, q, v, a, bars):
+def point_motion(model, order, component, at, before, b, r, q, v, a, bars):
     """Motion of a point of body b as body r sees it; see `kinematics_interface.point_motion`."""
     slope = np.empty((6, 3))
     i = 3 * b
     k = 3 * r
     value = point_response(
-        order, component, at, model.home[b], model.home[r], q[i : i + 3], v[i : i + 3], a[i : i + 3], q[k : k + 3],
-        v[k : k + 3], a[k : k + 3], slope,
+        order, component, at, before, model.home[b], model.home[r], q[i : i + 3], v[i : i + 3], a[i : i + 3],
+        q[k : k + 3], v[k : k + 3], a[k : k + 3], slope,
     )  # fmt: skip
     _add_slopes(i, k, slope, bars)
     return value

@@ -95,7 +95,7 @@ def _add_slopes_of_rates(one, two, s, s_rate, first, n, y, omega, b, r, bars):
 
 
 @kernel
-def point_motion(model, order, component, at, b, r, q, v, a, bars):
+def point_motion(model, order, component, at, before, b, r, q, v, a, bars):
     """Motion of a point of body b as body r sees it; see `kinematics_interface.point_motion`."""
     one = np.empty(ATTITUDE)
     two = np.empty(ATTITUDE)
@@ -113,6 +113,8 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
         since = plus(
             turned_back(one, TURN, plus(moved, turned(two, TURN_SINCE, s))), turned_back(one, TURN_SINCE, home)
         )
+        for axis in range(3):
+            since = minus(since, times(before[axis], axis_of(model, r, axis)))
         value, n = seen_along(model, r, component, since)
         _add_slopes_of_places(one, two, s, n, y, i, k, bars[0])
         return value
