@@ -24,7 +24,7 @@ LEAST_TOLERANCE = 1e-12
 #: what arrays may miss a straight line by, relative
 STRAIGHT = 1e-11
 #: the arrays that the balance is differentiated by
-READ = ("mass", "force", "load_force", "load_arm", "v0", "timed_par", "timed_arm")
+READ = ("mass", "force", "load_force", "load_arm", "v0")
 
 #: the arrays of all load cases with a larger and with a smaller number, and by how much the numbers differ
 Pair = tuple[dict[str, GeneralModel], dict[str, GeneralModel], float]

@@ -63,11 +63,14 @@ from mdstopo.mechanics.kinematics.planar_scales import (
     add_gross_force as add_gross,
 )
 from mdstopo.mechanics.kinematics.planar_scales import (
+    add_gross_timed_loads,
+    rounding_of_pairs,
+)
+from mdstopo.mechanics.kinematics.planar_scales import (
     deflection as deflection_of_pair,
 )
 from mdstopo.mechanics.kinematics.planar_scales import (
-    gross_loads,
-    rounding_of_pairs,
+    gross_loads as gross_steady_loads,
 )
 from mdstopo.mechanics.kinematics.planar_scales import (
     largest_turn as turn_of_pairs,
@@ -273,6 +276,14 @@ def load_tangent(model, segment, t, q, v, turn):
     tangent_of_loads(model, segment, t, q, turn.reshape(turn.size))
     if model.timed_load.shape[0] > 0:
         add_timed_tangent(model, segment, t, q, turn.reshape(turn.size))
+
+
+@part
+def gross_loads(model, out):
+    """See `planar_scales`."""
+    gross_steady_loads(model, out)
+    if model.timed_load.shape[0] > 0:
+        add_gross_timed_loads(model, out)
 
 
 @part
