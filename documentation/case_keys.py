@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mdstopo.case.definitions import Definitions
-from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
-from mdstopo.case.laws.expression import FormulaText, Parameters
+from mdstopo.case.formula_keys import FormulaNames, FormulaText
+from mdstopo.case.kinds import NUMBER, Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
+from mdstopo.case.laws.expression import Parameters
 from mdstopo.case.mesh_files import MeshFaces, MeshFile
 from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
 from mdstopo.case.records import ByDepth, ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
@@ -215,7 +216,11 @@ def _simple(kind: Kind) -> str:
     if isinstance(kind, Signals):
         table = f"[table](#{ROWS}) of rows `{kind.rows.row_text}`"
         constant = "number" if len(kind.names) == 1 else f"`[{', '.join(kind.names)}]`"
-        return f"{constant}, or {table}" if kind.constant else table
+        formula = "[formula of time](expressions.md#loads)"
+        ways = [*([constant] if kind.constant else []), *([formula] if kind.formula else []), table]
+        return f"{', '.join(ways[:-1])}, or {table}" if len(ways) > 1 else table
+    if isinstance(kind, FormulaNames):
+        return f"`{{name: {'number' if kind.item is NUMBER else 'response'}, ...}}`"
     if isinstance(kind, Version):
         return f"`{kind.number}`"
     if isinstance(kind, OneOf):
@@ -224,7 +229,7 @@ def _simple(kind: Kind) -> str:
         Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
         MeshFile: "path of an STL or OBJ file", MeshFaces: "path of an STL or OBJ file", Anything: "any value",
         Definitions: "`{name: number or expression, ...}`", SvgPath: "text of a path",
-        FormulaText: "an [expression](expressions.md#laws)", Parameters: "`{name: number, ...}`",
+        FormulaText: "an [expression](expressions.md)", Parameters: "`{name: number, ...}`",
     }  # fmt: skip
     return texts[type(kind)]
 

@@ -23,7 +23,8 @@ class Response(Value):
     at_local is in body coordinates of `body`; component: x | y | norm, in space also z. numbers: up to four of
     its own for its kernels; of a tilt: its axis, a unit vector in body coordinates. dimension: of the
     case, whose responses have records of their own. since: of a displacement, the place that it counts from,
-    stated | settled.
+    stated | settled. Of an expression: formula, the responses that it is of, with their names in it, numbers that it
+    has by name, and the unit that the case states.
     """
 
     kind: str
@@ -36,6 +37,15 @@ class Response(Value):
     numbers: tuple[float, ...] = ()
     dimension: int = 2
     since: str | None = None
+    formula: str = ""
+    of: tuple[tuple[str, Response], ...] = ()
+    parameters: tuple[tuple[str, float], ...] = ()
+    unit: str = ""
+
+    @property
+    def looked(self) -> tuple[Response, ...]:
+        """The responses that it is an expression of, or itself."""
+        return tuple(each for _, each in self.of) or (self,)
 
 
 @frozen

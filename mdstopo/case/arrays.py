@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.value import Value, frozen
+
+if TYPE_CHECKING:
+    from mdstopo.formula.time_formulas import TimeProgram
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -84,8 +87,49 @@ class Table(Value):
         object.__setattr__(self, "values", read_only(self.values))
 
 
-Signal = float | Table
-"""A scalar quantity over time: a constant, or a Table with m = 1."""
+@frozen
+class TimeFormula(Value):
+    """scale times a formula of t (s) and its parameters, plus offset."""
+
+    text: str
+    parameters: tuple[tuple[str, float], ...] = ()
+    scale: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def program(self) -> TimeProgram:
+        """The formula with its derivatives and switches."""
+        from mdstopo.formula.time_formulas import time_program  # most cases have no formulas
+
+        return time_program(self.text, tuple(name for name, _ in self.parameters))
+
+    def at(self, time: float) -> float:
+        """Its value; NaN where it has none."""
+        from mdstopo.formula.time_formulas import value_at  # most cases have no formulas
+
+        return self.scale * value_at(self.text, self.parameters, time) + self.offset
+
+    def rate_at(self, time: float) -> float:
+        """Its rate; NaN where it has none."""
+        from mdstopo.formula.time_formulas import rate_at  # most cases have no formulas
+
+        return self.scale * rate_at(self.text, self.parameters, time)
+
+    def sampled(self, times: FloatArray) -> FloatArray:
+        """(T,) its values at times (T,)."""
+        return np.array([self.at(time) for time in times.tolist()])
+
+    def times(self, factor: float) -> TimeFormula:
+        """The formula times a factor."""
+        return TimeFormula(self.text, self.parameters, self.scale * factor, self.offset * factor)
+
+    def shifted(self, by: float) -> TimeFormula:
+        """The formula plus a number."""
+        return TimeFormula(self.text, self.parameters, self.scale, self.offset + by)
+
+
+Signal = float | Table | TimeFormula
+"""A scalar quantity over time: a constant, a Table with m = 1, or a formula."""
 
 VectorSignal = tuple[Signal, ...]
 """Two components over time, three in space. A table of [t, x, y] becomes two Tables with the same times."""

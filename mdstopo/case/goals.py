@@ -12,6 +12,7 @@ from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.candidates import coefficients_of
 from mdstopo.case.catalogue import with_catalogue
 from mdstopo.case.design_variables import prices
+from mdstopo.case.expression_response import response_of
 from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.reading import BAD, Fields, Reading
@@ -135,17 +136,7 @@ def load_case_of(fields: Fields, top: Fields, reading: Reading) -> str | None:
 
 def build_response(fields: Fields, frames: Frames, reading: Reading) -> Response | None:
     """What an objective or a constraint looks at."""
-    stated = fields["response"]
-    if isinstance(stated, str):
-        return Response(stated, dimension=frames.geometry.number)
-    if not isinstance(stated, Fields) or len(stated.stated) != 1:
-        return None
-    (word,) = stated.stated
-    keys = stated[word]
-    if keys is BAD or not keys.good():
-        return None
-    made = frames.geometry.responses[word].made
-    return made(word, keys, frames, reading) if made is not None else Response(word, dimension=frames.geometry.number)
+    return response_of(fields["response"], frames, reading)
 
 
 def build_constraints(

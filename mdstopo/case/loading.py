@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.arrays import Signal, Table, VectorSignal
+from mdstopo.case.arrays import Signal, Table, TimeFormula, VectorSignal
 from mdstopo.case.model import GROUND, AnyBody, Components, Load, LoadCase, Motion
 from mdstopo.case.motions import Start
 from mdstopo.case.reading import BAD, Fields, Reading
@@ -132,12 +132,18 @@ def scaled(signals: VectorSignal, factor: float, path: str, reading: Reading) ->
     if not all(math.isfinite(largest(signal) * factor) for signal in signals):
         reading.mistake(path, f"times {number_text(factor)} it is too large for a number")
         return BAD
-    return tuple(
-        Table(signal.times, signal.values * factor) if isinstance(signal, Table) else signal * factor
-        for signal in signals
-    )
+    return tuple(times_of(signal, factor) for signal in signals)
+
+
+def times_of(signal: Signal, factor: float) -> Signal:
+    """A signal times a factor."""
+    if isinstance(signal, TimeFormula):
+        return signal.times(factor)
+    return Table(signal.times, signal.values * factor) if isinstance(signal, Table) else signal * factor
 
 
 def largest(signal: Signal) -> float:
-    """The largest magnitude over time."""
+    """The largest magnitude over time; of a formula, which is judged where its times are known, its factor."""
+    if isinstance(signal, TimeFormula):
+        return abs(signal.scale)
     return float(np.abs(signal.values).max()) if isinstance(signal, Table) else abs(signal)

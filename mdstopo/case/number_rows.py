@@ -14,6 +14,7 @@ from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
 from mdstopo.case.reading import BAD, Bad, Fields, Reading, found
 from mdstopo.case.records import Key, Record
 from mdstopo.case.scalars import resolve, to_float
+from mdstopo.case.time_formula import formula_record, is_expression, is_formula, read_formulas
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, number_text, shown
 
@@ -237,13 +238,14 @@ class Signals(Value):
 
     One quantity: a number, {table: rows} or the rows. Two: a list of two such values, {table: rows [t, x, y]}
     or the rows. Read as a tuple with one Signal for each name (or BAD). constant: whether a number will do;
-    order, at_least: as in `Rows`.
+    order, at_least: as in `Rows`. formula: whether formulas of time will do, in place of a number or of all.
     """
 
     names: tuple[str, ...]
     constant: bool = True
     order: str = "time"
     at_least: int = 1
+    formula: bool = False
 
     @property
     def rows(self) -> Rows:
@@ -258,6 +260,10 @@ class Signals(Value):
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """tuple[Signal, ...] or BAD."""
+        if self.formula and (is_formula(node) or self._is_text(node)):
+            number = "a number, " if self.constant else ""
+            instead = f"allowed is {number}an expression of t, or {{table: rows {self.rows.row_text}}}"
+            return read_formulas(node, self.names, path, reading, instead)
         if node.kind == MAPPING and "table" not in node.entries and "file" in node.entries:
             return self._split(self.rows.read(node, path, reading))
         if node.kind == MAPPING:
@@ -278,10 +284,15 @@ class Signals(Value):
             reading.mistake(path, f"found {found(node)}, allowed is {allowed}", node)
             return BAD
         parts = [
-            Signals((name,)).read(item, f"{path}[{index}]", reading)
+            Signals((name,), formula=self.formula).read(item, f"{path}[{index}]", reading)
             for index, (name, item) in enumerate(zip(self.names, node.items, strict=True))
         ]
         return BAD if any(part is BAD for part in parts) else tuple(part[0] for part in parts)
+
+    def _is_text(self, node: Node) -> bool:
+        """Whether one quantity is stated as text that is no number with a unit."""
+        text = len(self.names) == 1 and node.kind == SCALAR and isinstance(node.scalar(), str)
+        return text and (not has_unit(node) or is_expression(node.text))
 
     def _is_rows(self, node: Node) -> bool:
         if len(self.names) == 1:
@@ -298,10 +309,12 @@ class Signals(Value):
     def schema(self) -> Schema:
         """Constant, table or rows."""
         tables = [self.table.schema(), self.rows.schema()]
-        if not self.constant:
-            return {"anyOf": tables}
+        if self.formula:
+            tables.append(formula_record(self.names).schema())
         n = len(self.names)
+        if not self.constant:
+            return {"anyOf": [*([{"type": "string"}] if self.formula and n == 1 else []), *tables]}
         if n == 1:
             return {"anyOf": [expressible("number"), *tables]}
-        part = Signals(("value",)).schema()
+        part = Signals(("value",), formula=self.formula).schema()
         return {"anyOf": [{"type": "array", "items": part, "minItems": n, "maxItems": n}, *tables]}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.case.arrays import Signal, Table
+from mdstopo.case.arrays import Signal, Table, TimeFormula
 from mdstopo.case.model import Prescribed
 from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.spline import value_and_slope
@@ -23,6 +23,8 @@ KINDS = ("acceleration", "velocity", "position")
 
 def value_at(signal: Signal, time: float) -> float:
     """A scalar signal at `time`: linear between rows, constant outside, right-continuous."""
+    if isinstance(signal, TimeFormula):
+        return signal.at(time)
     if not isinstance(signal, Table):
         return signal
     t, x = signal.times, signal.values[:, 0]
@@ -35,7 +37,9 @@ def value_at(signal: Signal, time: float) -> float:
 
 
 def size_of(signal: Signal) -> float:
-    """The largest value of a signal, without its sign."""
+    """The largest value of a signal, without its sign; of a formula its factor."""
+    if isinstance(signal, TimeFormula):
+        return abs(signal.scale)
     return float(np.abs(signal.values).max()) if isinstance(signal, Table) else abs(signal)
 
 
@@ -48,10 +52,18 @@ def prescribed(fields: Fields | None) -> Prescribed | None:
 
 
 def position_at_start(signal: Signal, window: Window, path: str, reading: Reading) -> tuple[float, float, float] | None:
-    """Value and rate at the start of a table of positions, and by how much it changes per second.
+    """Value and rate at the start of positions, and by how much they change per second.
 
-    None where it does not cover the simulated time, or is too steep, which is noted at `path`.
+    None where a table does not cover the simulated time, or is too steep, or a formula has no value, which is noted at
+    `path`.
     """
+    if isinstance(signal, TimeFormula):
+        value, rate = signal.at(window.start), signal.rate_at(window.start)
+        if not (math.isfinite(value) and math.isfinite(rate)):
+            when = number_text(window.start)
+            reading.mistake(path, f"the expression has no value, or no rate, at the start, {when} s")
+            return None
+        return value, rate, abs(rate)
     assert isinstance(signal, Table)
     t, x = signal.times, signal.values[:, 0]
     if not (t[0] <= window.start and window.end <= t[-1]):

@@ -5,19 +5,20 @@ How a response is computed stands in `mdstopo.general`, in what its record names
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from mdstopo.case.aims import Response
 from mdstopo.case.distributions import Brought
+from mdstopo.case.expression_response import expression_keys, make_expression
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import Ref, explained
 from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.records import Key, Record
+from mdstopo.case.records import ByShape, Key, Record
 from mdstopo.case.schema_frame import FRAME
-from mdstopo.case.schema_scene import BODY, GROUP
+from mdstopo.case.schema_scene import BODY, GROUP, IN_SPACE
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, shown
@@ -32,7 +33,7 @@ class ResponseKind(Value):
     word: as case files have it; doc: what of what, for the case reference; unit: of its values.
     keys: those that stand beside it, None where the word stands alone; made: the response from its keys, None where
     something is a mistake, which is noted.
-    kernels: where its `ResponseKernels` are (`general.response_kernels`), module:name.
+    kernels: where its `ResponseKernels` are (`general.response_kernels`), module:name; empty of an expression.
     order: how many derivatives by time it has of a position; is_position: whether it is a place or an angle of a body.
     of_point: whether it is the motion of a point, seen from a body, as a component or a norm.
     depends_on_rate: whether it needs velocities or accelerations; is_energy: whether it is the stored energy.
@@ -150,6 +151,57 @@ def _angle(word: str, unit: str, order: int) -> ResponseKind:
     )  # fmt: skip
 
 
+def key_of(kind: ResponseKind) -> Key:
+    """A response with keys of its own, as the case file has it."""
+    assert kind.keys is not None
+    return Key(kind.word, kind.keys, f"{kind.doc}, in {kind.unit}" if kind.unit else kind.doc)
+
+
+def enter_response(kind: Any) -> Key:
+    """Take in a response of another distribution; TypeError where it is none, or its word is taken."""
+    if not isinstance(kind, ResponseKind) or kind.keys is None or kind.made is None:
+        raise TypeError(f"found {kind!r}, needed is a ResponseKind with `keys` and `made`")
+    if RESPONSES.setdefault(kind.word, kind) is not kind:
+        raise TypeError(f"there is a response {kind.word!r} already")
+    return key_of(kind)
+
+
+#: responses of other distributions
+OF_OTHERS = Brought("mdstopo.responses", enter_response)
+
+
+def response_kinds(
+    kinds: Mapping[str, ResponseKind], elsewhere: tuple[tuple[str, str], ...], more: Brought[Key] | None = None
+) -> ByShape:
+    """A response of some kinds, as the case file has it.
+
+    elsewhere: words of responses that are not of this dimension, and what stands in their place. more: those of other
+    distributions.
+    """
+    worded = tuple(kind.word for kind in kinds.values() if kind.keys is not None)
+    return ByShape(
+        "energy | a mapping such as {displacement: {body: b}}",
+        scalar=explained(
+            {kind.word: kind.doc for kind in kinds.values() if kind.keys is None},
+            " | a mapping such as {displacement: {body: b}}",
+        ),
+        mapping=Record(
+            "a response", tuple(key_of(kinds[word]) for word in worded), one_of=(worded,), doc="Exactly one of these.",
+            more=more, elsewhere=elsewhere,
+        ),
+    )  # fmt: skip
+
+
+def of_expressions(response: ByShape) -> ResponseKind:
+    """The response that is an expression of others, which case files have so."""
+    return ResponseKind(
+        word="expression", doc="an expression of other responses", unit="", kernels="", keys=expression_keys(response),
+        made=make_expression,
+    )  # fmt: skip
+
+
+#: responses in space that the plane has not, and what stands in their place
+IN_SPACE_ALONE = (("rotation", f"in the plane it is `angle`; {IN_SPACE}"), ("tilt", IN_SPACE))
 #: the responses by their word; their codes in kernels follow this order
 RESPONSES: dict[str, ResponseKind] = {
     kind.word: kind
@@ -197,6 +249,9 @@ RESPONSES: dict[str, ResponseKind] = {
 }
 
 
+RESPONSES["expression"] = of_expressions(response_kinds(dict(RESPONSES), IN_SPACE_ALONE, OF_OTHERS))
+
+
 def kind_of(response: Response) -> ResponseKind:
     """The record of a response; KeyError where there is none."""
     if response.dimension == 3:
@@ -217,23 +272,5 @@ def unit_stated(node: Node) -> str:
     kind = RESPONSES.get(words[0]) if words else None
     over_time = node.entries.get("over_time")
     integral = over_time is not None and over_time[1].kind == SCALAR and over_time[1].text == "integral"
-    return "" if kind is None else f"{kind.unit} s" if integral else kind.unit
-
-
-def key_of(kind: ResponseKind) -> Key:
-    """A response with keys of its own, as the case file has it."""
-    assert kind.keys is not None
-    return Key(kind.word, kind.keys, f"{kind.doc}, in {kind.unit}")
-
-
-def enter_response(kind: Any) -> Key:
-    """Take in a response of another distribution; TypeError where it is none, or its word is taken."""
-    if not isinstance(kind, ResponseKind) or kind.keys is None or kind.made is None:
-        raise TypeError(f"found {kind!r}, needed is a ResponseKind with `keys` and `made`")
-    if RESPONSES.setdefault(kind.word, kind) is not kind:
-        raise TypeError(f"there is a response {kind.word!r} already")
-    return key_of(kind)
-
-
-#: responses of other distributions
-OF_OTHERS = Brought("mdstopo.responses", enter_response)
+    unit = "" if kind is None else kind.unit
+    return f"{unit} s" if unit and integral else unit

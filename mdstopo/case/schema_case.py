@@ -29,7 +29,7 @@ from mdstopo.case.nodes import SCALAR, Node
 from mdstopo.case.number_rows import FileName
 from mdstopo.case.reading import Reading
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
-from mdstopo.case.responses import OF_OTHERS, RESPONSES, key_of, unit_stated
+from mdstopo.case.responses import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_fit import fit_record
 from mdstopo.case.schema_scene import (
@@ -37,7 +37,6 @@ from mdstopo.case.schema_scene import (
     BUSHING,
     GROUP,
     GROUP_KEYS,
-    IN_SPACE,
     JOINT,
     LAW,
     LOAD_CASE,
@@ -178,21 +177,7 @@ DESIGN = Record(
     doc="The design variables: alpha, one for each member with `design: true`, and parameters of laws. In `initial`, "
     "`lower`, `upper` and `power` groups left out have the default.",
 )
-_RESPONSE = ByShape(
-    "energy | a mapping such as {displacement: {body: b}}",
-    scalar=explained(
-        {kind.word: kind.doc for kind in RESPONSES.values() if kind.keys is None},
-        " | a mapping such as {displacement: {body: b}}",
-    ),
-    mapping=Record(
-        "a response",
-        tuple(key_of(kind) for kind in RESPONSES.values() if kind.keys is not None),
-        one_of=(tuple(kind.word for kind in RESPONSES.values() if kind.keys is not None),),
-        doc="Exactly one of these.",
-        more=OF_OTHERS,
-        elsewhere=(("rotation", f"in the plane it is `angle`; {IN_SPACE}"), ("tilt", IN_SPACE)),
-    ),
-)
+_RESPONSE = response_kinds(RESPONSES, IN_SPACE_ALONE, OF_OTHERS)
 _REDUCERS = explained(
     {
         "max": "its largest value, in continuous time; where it jumps, the larger one-sided limit",

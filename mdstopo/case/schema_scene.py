@@ -105,8 +105,9 @@ COORDINATE = Record(
         ),
         Key(
             "position",
-            Signals(("x",), constant=False, order="rising", at_least=4),
-            "position, a table of at least 4 rows from start to end without repeated times; a cubic spline joins them",
+            Signals(("x",), constant=False, order="rising", at_least=4, formula=True),
+            "position, a table of at least 4 rows from start to end without repeated times, which a cubic spline "
+            "joins, or an expression of t",
             unit="m or rad",
         ),
     ),
@@ -295,10 +296,15 @@ LOAD = Record(
     "a load",
     (
         Key("body", BODY, "the body that it acts on", required=True),
-        Key("force", Signals(("fx", "fy")), "force", unit="N"),
-        Key("moment", Signals(("moment",)), "couple, counter-clockwise", unit="N m"),
-        Key("acceleration", Signals(("ax", "ay")), "stands for the force mass times this", unit="m/s^2"),
-        Key("angular_acceleration", Signals(("value",)), "stands for the couple inertia times this", unit="rad/s^2"),
+        Key("force", Signals(("fx", "fy"), formula=True), "force", unit="N"),
+        Key("moment", Signals(("moment",), formula=True), "couple, counter-clockwise", unit="N m"),
+        Key("acceleration", Signals(("ax", "ay"), formula=True), "stands for the force mass times this", unit="m/s^2"),
+        Key(
+            "angular_acceleration",
+            Signals(("value",), formula=True),
+            "stands for the couple inertia times this",
+            unit="rad/s^2",
+        ),
         Key("at", PAIR, "where the force acts; rides on the body", unit="m", otherwise="the centre of mass"),
         Key("frame", FRAMES, "of `at` and of the force; body: a follower load", default="global"),
     ),

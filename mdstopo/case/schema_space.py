@@ -7,11 +7,11 @@ from dataclasses import replace
 from mdstopo.case.joints.joint import record_of
 from mdstopo.case.joints.spatial import SPATIAL_JOINTS
 from mdstopo.case.joints.spatial_keys import DIRECTION, POINT, TRIPLE
-from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind, explained
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind
 from mdstopo.case.mesh_files import MeshFile
 from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByDepth, ByShape, Key, ListOf, Named, Record, Tagged, Vector
-from mdstopo.case.responses import key_of
+from mdstopo.case.responses import response_kinds
 from mdstopo.case.schema_case import CONSTRAINT, FORMAT, LOAD_CASE_KEY, OBJECTIVE
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_fit import fit_record
@@ -32,7 +32,7 @@ from mdstopo.case.schema_scene import (
     POINTS,
 )
 from mdstopo.case.schema_surface import SURFACE
-from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
+from mdstopo.case.spatial_responses import IN_PLANE_ALONE, SPATIAL_RESPONSES
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -125,9 +125,9 @@ _ANGLE_KEYS = (
     Key("velocity", Signals(("v",)), "rate; the body's own, where stated, must agree at the start", unit="rad/s"),
     Key(
         "position",
-        Signals(("x",), constant=False, order="rising", at_least=4),
-        "the angle itself, 0 at the start: a table of at least 4 rows from start to end without repeated times; a "
-        "cubic spline joins them",
+        Signals(("x",), constant=False, order="rising", at_least=4, formula=True),
+        "the angle itself, 0 at the start: a table of at least 4 rows from start to end without repeated times, which "
+        "a cubic spline joins, or an expression of t",
         unit="rad",
     ),
 )
@@ -343,12 +343,12 @@ def _end(name: str) -> Key:
 GROUP = with_keys(GROUP_KEYS, _end("from"), _end("to"))
 LOAD_KEYS = with_keys(
     LOAD,
-    with_kind(LOAD, "force", Signals(("fx", "fy", "fz"))),
-    Key("moment", Signals(("mx", "my", "mz")), "couple, in the same frame", unit="N m"),
-    with_kind(LOAD, "acceleration", Signals(("ax", "ay", "az"))),
+    with_kind(LOAD, "force", Signals(("fx", "fy", "fz"), formula=True)),
+    Key("moment", Signals(("mx", "my", "mz"), formula=True), "couple, in the same frame", unit="N m"),
+    with_kind(LOAD, "acceleration", Signals(("ax", "ay", "az"), formula=True)),
     Key(
         "angular_acceleration",
-        Signals(("x", "y", "z")),
+        Signals(("x", "y", "z"), formula=True),
         "stands for the couple J times this, J as the body has turned by then",
         unit="rad/s^2",
     ),
@@ -365,20 +365,7 @@ _CASE = with_keys(
 )
 
 # What is looked at.
-_RESPONSE = ByShape(
-    "energy | a mapping such as {displacement: {body: b}}",
-    scalar=explained(
-        {kind.word: kind.doc for kind in SPATIAL_RESPONSES.values() if kind.keys is None},
-        " | a mapping such as {displacement: {body: b}}",
-    ),
-    mapping=Record(
-        "a response",
-        tuple(key_of(kind) for kind in SPATIAL_RESPONSES.values() if kind.keys is not None),
-        one_of=(tuple(kind.word for kind in SPATIAL_RESPONSES.values() if kind.keys is not None),),
-        doc="Exactly one of these.",
-        elsewhere=(("angle", "in space it is `rotation`"),),
-    ),
-)
+_RESPONSE = response_kinds(SPATIAL_RESPONSES, IN_PLANE_ALONE)
 _OBJECTIVE = with_keys(OBJECTIVE, with_kind(OBJECTIVE, "response", _RESPONSE))
 _CONSTRAINT = with_keys(CONSTRAINT, with_kind(CONSTRAINT, "response", _RESPONSE))
 

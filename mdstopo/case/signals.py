@@ -2,19 +2,55 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
-from mdstopo.case.arrays import FloatArray, Signal, Table, VectorSignal
+from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula, VectorSignal
+
+
+class MixedSignalsError(Exception):
+    """A formula of time and a table would have to be added."""
 
 
 def combined(matrix: FloatArray, signals: VectorSignal) -> VectorSignal:
-    """The products of a matrix (m, n) with n signals: constants where all are, else tables of common times."""
+    """The products of a matrix (m, n) with n signals: constants where all are, else tables of common times.
+
+    Formulas where some are formulas. Raises MixedSignalsError where a formula and a table would have to be added.
+    """
+    if any(isinstance(signal, TimeFormula) for signal in signals):
+        return tuple(_summed(row, signals) for row in matrix.tolist())
     tables = [signal for signal in signals if isinstance(signal, Table)]
     if not tables:
         return tuple((matrix @ np.array(signals)).tolist())
     times = common_times(tables)
     values = np.stack([_sampled(signal, times) for signal in signals], axis=1) @ matrix.T
     return tuple(Table(times, values[:, i : i + 1]) for i in range(len(matrix)))
+
+
+def _summed(factors: list[float], signals: VectorSignal) -> Signal:
+    """The sum of some signals, of which one is a formula, times factors."""
+    terms = [(factor, signal) for factor, signal in zip(factors, signals, strict=True) if factor != 0.0]
+    if not any(isinstance(signal, TimeFormula) for _, signal in terms):
+        return combined(np.array([factors]), tuple(0.0 if isinstance(s, TimeFormula) else s for s in signals))[0]
+    if len(terms) == 1 and isinstance(terms[0][1], TimeFormula):
+        return terms[0][1].times(terms[0][0])
+    texts, parameters = [], dict[str, float]()
+    for factor, signal in terms:
+        if isinstance(signal, Table):
+            raise MixedSignalsError
+        if isinstance(signal, TimeFormula):
+            text = signal.text
+            for name, value in signal.parameters:
+                own = name
+                while parameters.get(own, value) != value:
+                    own += "_"
+                parameters[own] = value
+                text = re.sub(rf"\b{name}\b", own, text)
+            texts.append(f"{factor * signal.scale!r}*({text}) + {factor * signal.offset!r}")
+        else:
+            texts.append(repr(factor * signal))
+    return TimeFormula(" + ".join(f"({text})" for text in texts), tuple(parameters.items()))
 
 
 def common_times(tables: list[Table]) -> FloatArray:
@@ -26,6 +62,7 @@ def common_times(tables: list[Table]) -> FloatArray:
 
 def _sampled(signal: Signal, times: FloatArray) -> FloatArray:
     """A signal at rising times; of a time that is there twice the limit from the left, then that from the right."""
+    assert not isinstance(signal, TimeFormula)
     if not isinstance(signal, Table):
         return np.full(len(times), signal)
     t, x = signal.times, signal.values[:, 0]

@@ -17,7 +17,7 @@ from mdstopo.case.outlines import build_outlines
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
-from mdstopo.case.signals import combined
+from mdstopo.case.signals import MixedSignalsError, combined
 from mdstopo.case.spatial_grids import check_grid, grid_count, grid_points
 from mdstopo.case.spatial_outlines import SPATIAL
 from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
@@ -159,7 +159,11 @@ def _weighed(signals: VectorSignal, tensor: FloatArray, path: str, reading: Read
     if not all(math.isfinite(largest(signal) * float(np.abs(tensor).max()) * 3.0) for signal in signals):
         reading.mistake(path, "times the moments of inertia it is too large for a number")
         return BAD
-    return combined(tensor, signals)
+    try:
+        return combined(tensor, signals)
+    except MixedSignalsError:
+        reading.mistake(path, "its products of inertia would add a formula and a table: state all as formulas, or none")
+        return BAD
 
 
 def _least(body: SpatialBody) -> float:

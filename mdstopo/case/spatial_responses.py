@@ -9,7 +9,16 @@ from mdstopo.case.joints.spatial_keys import DIRECTION, TRIPLE
 from mdstopo.case.kinds import explained
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
-from mdstopo.case.responses import OF_BODY, RELATIVE, RESPONSES, ResponseKind, sees_itself, with_since
+from mdstopo.case.responses import (
+    OF_BODY,
+    RELATIVE,
+    RESPONSES,
+    ResponseKind,
+    of_expressions,
+    response_kinds,
+    sees_itself,
+    with_since,
+)
 from mdstopo.case.rotations import unit
 from mdstopo.case.schema_frame import FRAME
 from mdstopo.case.start_geometry import Frames
@@ -129,3 +138,6 @@ SPATIAL_RESPONSES: dict[str, ResponseKind] = {
         _of_others("joint_moment"),
     )
 }
+#: responses in the plane that space has not, and what stands in their place
+IN_PLANE_ALONE = (("angle", "in space it is `rotation`"),)
+SPATIAL_RESPONSES["expression"] = of_expressions(response_kinds(dict(SPATIAL_RESPONSES), IN_PLANE_ALONE))

@@ -5,8 +5,8 @@ from mdstopo.case.responses import kind_of
 
 
 def unit_of(response: Response) -> str:
-    """The unit of a response."""
-    return kind_of(response).unit
+    """The unit of a response; that of an expression as the case states it, `-` where it does not."""
+    return response.unit or kind_of(response).unit
 
 
 def unit_of_value(objective: Objective) -> str:
@@ -17,6 +17,8 @@ def unit_of_value(objective: Objective) -> str:
 
 def words(response: Response) -> str:
     """A response in words: `displacement x of torso relative to vehicle`."""
+    if response.formula:
+        return response.formula
     parts = [response.kind.replace("_", " ")]
     if response.component not in (None, "norm"):
         parts.append(str(response.component))

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.arrays import Signal, TimeFormula
 from mdstopo.case.columns import point_columns
 from mdstopo.case.model import GROUND, Case, Contact, SpringLaw, SurfaceContact, Table, VolumeRow
 from mdstopo.cli.output import number
@@ -125,8 +126,10 @@ def _elastic(values: Floats) -> Floats:
     return elastic
 
 
-def _at(signal: float | Table, time: float) -> float:
+def _at(signal: Signal, time: float) -> float:
     """A signal's value at a time, right-continuous."""
+    if isinstance(signal, TimeFormula):
+        return signal.at(time)
     if not isinstance(signal, Table):
         return float(signal)
     after = int(np.searchsorted(signal.times, time, side="right"))

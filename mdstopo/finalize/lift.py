@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.arrays import FloatArray, Signal, Table
+from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.number_rows import Signals
@@ -20,7 +20,7 @@ from mdstopo.case.overrides import node_of, steps_of
 from mdstopo.case.reading import Reading
 from mdstopo.case.responses import RESPONSES
 from mdstopo.case.rotations import about_axis
-from mdstopo.case.signals import combined
+from mdstopo.case.signals import MixedSignalsError, combined
 from mdstopo.case.words import inside, shown
 from mdstopo.case.yaml_text import text_of
 from mdstopo.finalize.document import Plain, content_of
@@ -123,9 +123,15 @@ class _Lift:
             return [0, 0, size]
         return _plain(self.plane[:, 2] * size)
 
-    def signals(self, value: Any, matrix: FloatArray) -> Any:
+    def signals(self, value: Any, matrix: FloatArray, path: str) -> Any:
         """What a planar quantity over time is in space."""
-        found = combined(matrix, read_signals(value, ("x", "y")[: matrix.shape[1]]))
+        try:
+            found = combined(matrix, read_signals(value, ("x", "y")[: matrix.shape[1]]))
+        except MixedSignalsError:
+            self.refuse(path, "in a tilted plane a formula and a table would be added: state both as formulas")
+            return value
+        if any(isinstance(each, TimeFormula) for each in found):
+            return [_stated(each) for each in found]
         if not isinstance(found[0], Table):
             return list(found)
         columns = [found[0].times, *(each.values[:, 0] for each in found if isinstance(each, Table))]
@@ -210,9 +216,12 @@ class _Lift:
         return new
 
     def since_start(self, value: Any, body: str) -> Plain:
-        """A table of angles less the angle at the start: a rotation in space counts from there."""
+        """Angles over time less the angle at the start: a rotation in space counts from there."""
         start = next(each.angle for each in self.case.bodies if each.name == body)
         (table,) = read_signals(value, ("x",))
+        if isinstance(table, TimeFormula):
+            shifted: Plain = _stated(table.shifted(-start))
+            return shifted
         assert isinstance(table, Table)
         return {"table": np.column_stack([table.times, table.values[:, 0] - start]).tolist()}
 
@@ -288,16 +297,15 @@ class _Lift:
 
     def load(self, old: Plain, path: str) -> Plain:
         """Forces stay in the plane, couples are along its normal."""
-        del path
         frame = _frame(old)
         axes = np.eye(3) if frame == "body" else self.plane
         new = dict(old)
         for key in ("force", "acceleration"):
             if key in old:
-                new[key] = self.signals(old[key], axes[:, :2])
+                new[key] = self.signals(old[key], axes[:, :2], inside(path, key))
         for key in ("moment", "angular_acceleration"):
             if key in old:
-                new[key] = self.signals(old[key], axes[:, 2:])
+                new[key] = self.signals(old[key], axes[:, 2:], inside(path, key))
         if "at" in old:
             new["at"] = self.vector(old["at"], frame)
         return new
@@ -321,6 +329,8 @@ class _Lift:
         from_ground = self.is_tilted and keys.get("relative_to", GROUND) == GROUND
         if word in _SAME:
             return {word: keys}
+        if word == "expression":
+            return {word: {**keys, "of": self.parts(keys["of"], over_time, inside(here, "of"))}}
         if word in _ANGLES:
             if kind.is_position and self.angle_at_start(keys) != 0.0:
                 words = "it is not 0 at the start, from which a rotation in space counts"
@@ -336,6 +346,17 @@ class _Lift:
         if from_ground and keys.get("component", "norm") != "norm":
             self.refuse(inside(here, "component"), "in a tilted plane it is no single component")
         return {word: {**keys, "at": self.vector(keys["at"], _frame(keys))} if "at" in keys else keys}
+
+    def parts(self, stated: Plain, over_time: str, path: str) -> Plain:
+        """The responses that an expression is of."""
+        lifted: Plain = {}
+        for name, part in stated.items():
+            if isinstance(part, Mapping):
+                ((word, keys),) = part.items()
+                lifted[name] = self.response(word, keys, over_time, inside(path, name))
+            else:
+                lifted[name] = part
+        return lifted
 
     def angle_at_start(self, keys: Plain) -> float:
         """By what angle a body is turned at the start against the one that it is seen from, rad."""
@@ -382,10 +403,21 @@ class _Lift:
         return bool(before == behind or (not self.is_tilted and behind == [*before, 0]))
 
 
+def _stated(signal: Signal) -> Any:
+    """A constant or a formula of time, as a case file has it; a table of one quantity."""
+    if isinstance(signal, Table):
+        return {"table": np.column_stack([signal.times, signal.values]).tolist()}
+    if not isinstance(signal, TimeFormula):
+        return signal
+    text = signal.text if signal.scale == 1.0 else f"{signal.scale!r} * ({signal.text})"
+    text = text if signal.offset == 0.0 else f"{text} + {signal.offset!r}"
+    return {"formula": text, "parameters": dict(signal.parameters)} if signal.parameters else text
+
+
 def read_signals(value: Any, names: tuple[str, ...]) -> tuple[Signal, ...]:
     """A quantity over time that has been read before."""
     reading = Reading(Path())
-    read: tuple[Signal, ...] = Signals(names).read(node_of(value, ""), "", reading)
+    read: tuple[Signal, ...] = Signals(names, formula=True).read(node_of(value, ""), "", reading)
     assert not reading.mistakes
     return read
 

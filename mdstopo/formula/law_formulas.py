@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from mdstopo.formula.calculus import (
@@ -19,7 +19,17 @@ from mdstopo.formula.calculus import (
     simplified,
     substituted,
 )
-from mdstopo.formula.modes import HALF, MOTION, Smooth, Switch, is_set, smooth, ways_to
+from mdstopo.formula.modes import (
+    HALF,
+    MOST_SWITCHES,
+    MOTION,
+    Smooth,
+    Switch,
+    TooManySwitchesError,
+    is_set,
+    smooth,
+    ways_to,
+)
 from mdstopo.formula.parser import parse
 from mdstopo.formula.tree import NUMBER, Expression, name, names_in, number, operation, parts
 
@@ -81,7 +91,24 @@ class Program(NamedTuple):
     @property
     def operations(self) -> int:
         """How many operations all groups have, equal ones of a group once."""
-        return sum(sum(1 for _ in parts(*group.values)) for group in self.groups)
+        return operations_of(self.groups)
+
+
+def operations_of(groups: tuple[Group, ...]) -> int:
+    """How many operations groups of formulas have, equal ones of a group once."""
+    return sum(sum(1 for _ in parts(*group.values)) for group in groups)
+
+
+def why_too_large(groups: Callable[[], tuple[Group, ...]]) -> str:
+    """Why formulas are too large to be used; nothing where they are not. groups: makes them."""
+    try:
+        operations = operations_of(groups())
+    except TooManySwitchesError:
+        which = "abs, min, max, clip, sign, step, if"
+        return f"found more kinks and jumps ({which}) than allowed, which are {MOST_SWITCHES}"
+    if operations <= MOST_OPERATIONS:
+        return ""
+    return f"found {operations} operations in the formulas with all derivatives, allowed are {MOST_OPERATIONS} at most"
 
 
 def _smooth(force: str | None, energy: str | None, damping: str | None, names: tuple[str, ...]) -> Smooth:
@@ -113,25 +140,25 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
     words = [*(f"p {place}" for place in range(len(names))), "l0"]
     near = [_near(switch.margin) for switch in found.switches]
     margins = [divide(switch.margin, size) for switch, size in zip(found.switches, near, strict=True)]
-    looked_at = _limited([(f, ONE), (v, ONE), *((each.margin, each.relevant) for each in found.switches)])
+    looked_at = limited([(f, ONE), (v, ONE), *((each.margin, each.relevant) for each in found.switches)])
     groups = [
-        _group((f, derivative(f, "x"), derivative(f, "xd"), v, derivative(v, "x")), looked_at),
-        _group((_lowest(margins, found.switches),)),
+        group_of((f, derivative(f, "x"), derivative(f, "xd"), v, derivative(v, "x")), looked_at),
+        group_of((lowest_of(margins, found.switches),)),
     ]
     for word in words:
         both = derivative(f, word), derivative(v, word)
-        groups.append(_group(both, _limited([(slope, ONE) for slope in both])))
+        groups.append(group_of(both, limited([(slope, ONE) for slope in both])))
     for (margin, relevant), size, value in zip(found.switches, near, margins, strict=True):
         slopes = tuple(divide(derivative(margin, word), size) for word in MOTION)
-        groups.append(_group((value, *slopes, relevant)))
+        groups.append(group_of((value, *slopes, relevant)))
     for (margin, _), size in zip(found.switches, near, strict=True):
-        groups += [_group((divide(derivative(margin, word), size),)) for word in words]
+        groups += [group_of((divide(derivative(margin, word), size),)) for word in words]
     by_time = derivative(f, "t")
-    groups.append(_group((by_time,), _limited([(by_time, ONE)])))
+    groups.append(group_of((by_time,), limited([(by_time, ONE)])))
     return Program(tuple(groups), len(names), len(found.switches))
 
 
-def _group(values: tuple[Expression, ...], guards: Iterable[Guard] = ()) -> Group:
+def group_of(values: tuple[Expression, ...], guards: Iterable[Guard] = ()) -> Group:
     """A group, simplified."""
     made = (Guard(simplified(each.part), simplified(each.reached)) for each in guards)
     return Group(tuple(simplified(each) for each in values), tuple(each for each in made if _may_fail(each.part)))
@@ -151,7 +178,7 @@ def _near(margin: Expression) -> Expression:
     return choose(operation("<", size, LARGE), call("max", size, NOUGHT), ONE)
 
 
-def _lowest(margins: list[Expression], switches: tuple[Switch, ...]) -> Expression:
+def lowest_of(margins: list[Expression], switches: tuple[Switch, ...]) -> Expression:
     """The smallest margin of the switches that are looked at, each with the sign that its mode makes positive."""
     lowest = NONE
     for place, (margin, switch) in enumerate(zip(margins, switches, strict=True)):
@@ -162,7 +189,7 @@ def _lowest(margins: list[Expression], switches: tuple[Switch, ...]) -> Expressi
     return lowest
 
 
-def _limited(roots: list[tuple[Expression, Expression]]) -> list[Guard]:
+def limited(roots: list[tuple[Expression, Expression]]) -> list[Guard]:
     """The operations that may have no value, of formulas that are looked at where the other number is 1."""
     ways = ways_to(*roots)
     return [Guard(part, way) for part, way in ways.items() if _may_fail(part) and not is_number(way, 0.0)]

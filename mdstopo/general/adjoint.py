@@ -24,13 +24,15 @@ from mdstopo.general.model import KIND, SUBJECT
 from mdstopo.general.parameters import add_event, add_times, event_slope
 from mdstopo.general.permanent_sets import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.responses import (
-    ENERGY,
     MEMBER_FORCE,
     across_rate,
     across_slopes,
+    chosen_part,
+    energy_weight,
     equal_forces,
+    has_energy,
+    has_switches,
     kinked,
-    largest_force,
     members_of,
     response,
     value_at,
@@ -212,9 +214,10 @@ def row_cotangents(
         across_slopes(model, j, q, v, a, lam, bars, row_bar)
     else:
         response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
+    weight = energy_weight(model, member_state, segment, j, who, t, q, v, a, lam, workspace)
     if bar_set.shape[0] > 0:
         bar_set[:] = 0.0
-        add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, 1.0, bar_set)
+        add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, weight, 1.0, bar_set)
     z = bars[2]
     factor_matrix(
         model,
@@ -232,7 +235,6 @@ def row_cotangents(
     accelerations_vjp(model, workspace, workspace.k, workspace.c, workspace.turn, z, row_bar, bars[0], bars[1])
     free_only(model, bars[0])
     free_only(model, bars[1])
-    weight = 1.0 if model.response[j, KIND] == ENERGY else 0.0
     add_design(model, segment, t, member_state, q, v, a, z, weight, out, work)
     sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
     explicit_part(model, segment, j, who, t, member_state, q, v, a, sign, out)
@@ -378,12 +380,47 @@ def at_stage(model, member_state, segment, history, at, j, who, workspace, own, 
     v = history.stage_v[at]
     a = history.stage_a[at]
     t = history.when[at]
-    if model.response[j, KIND] == ENERGY:
+    if has_energy(model, j):
         general_forces(model, member_state, segment, t, q, v, np.bool_(False), workspace)
-    if who < 0 and model.response[j, KIND] == MEMBER_FORCE:
-        who = largest_force(model, member_state, segment, t, model.response[j, SUBJECT], q, v, a)
+    who = chosen_part(model, member_state, segment, j, who, t, q, v, a, history.lam[at], workspace)
     value = response(model, member_state, segment, j, who, t, q, v, a, history.lam[at], workspace, own, own_rows)
     return value, who
+
+
+@kernel
+def sides_inside(model, member_state, segment, history, o, stages, j, workspace):
+    """On which sides the switches of expression j are inside a step.
+
+    Constant:
+      model: the compiled scene.
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      segment: segment of `model.times` in which the step lies.
+      history: the history of steps.
+      o, stages: number of the step's first stage, and how many it has; of two the first is where the step begins, and
+        one that has its end alone begins where the last one ended.
+      j: the response, an expression with switches.
+    Out:
+      workspace: workspace of a balance, overwritten.
+    """
+    if stages > 2:
+        at = o + (stages - 1) // 2
+        q, v, a, t = history.stage_q[at].copy(), history.stage_v[at], history.stage_a[at], history.when[at]
+        lam = history.lam[at]
+    else:
+        last = o + stages - 1
+        first = max(last - 1, 0)
+        way = np.empty(model.mass.shape[0])
+        q = np.empty(model.q0.shape[0])
+        difference(model, history.stage_q[last], history.stage_q[first], way)
+        way *= 0.5
+        retract(model, history.stage_q[first], way, q)
+        v = 0.5 * (history.stage_v[first] + history.stage_v[last])
+        a = 0.5 * (history.stage_a[first] + history.stage_a[last])
+        t = 0.5 * (history.when[first] + history.when[last])
+        lam = 0.5 * (history.lam[first] + history.lam[last])
+    if has_energy(model, j):
+        general_forces(model, member_state, segment, t, q, v, np.bool_(False), workspace)
+    return chosen_part(model, member_state, segment, j, np.int64(-1), t, q, v, a, lam, workspace)
 
 
 @kernel
@@ -517,11 +554,12 @@ def integral_cotangents(
     out[:] = 0.0
     none = np.zeros(n)
     kind = model.response[j, KIND]
-    energy = kind == ENERGY
+    energy = has_energy(model, j)
     bends = kinked(model, j)
+    switches = has_switches(model, j)
     slopes = np.zeros((3, n))
     rows = np.zeros(n_row)
-    mine = -1
+    mine = np.int64(-1)
     size = 0.0
     tied = np.empty(members_of(model, model.response[j, SUBJECT]) if kind == MEMBER_FORCE else 1, np.int64)
     ties = 1
@@ -533,8 +571,11 @@ def integral_cotangents(
         stages = history.index[w + 1, FIRST] - o
         # of two stages the first is where the step begins; one that has its end alone begins where the last one ended
         inside = o + (stages - 1) // 2 if stages > 1 else o - 1
+        if switches:  # the step ends where one changes: all stages are on the sides of its inside
+            mine = sides_inside(model, member_state, segment, history, o, stages, j, workspace)
         if bends:
-            size, mine = at_stage(model, member_state, segment, history, inside, j, -1, workspace, slopes, rows)
+            asked = mine if switches else np.int64(-1)
+            size, mine = at_stage(model, member_state, segment, history, inside, j, asked, workspace, slopes, rows)
             if gradient and kind == MEMBER_FORCE:
                 ties = equal_forces(
                     model,
@@ -555,7 +596,8 @@ def integral_cotangents(
             v = history.stage_v[o + i]
             a = history.stage_a[o + i]
             t = history.when[o + i]
-            value, who = at_stage(model, member_state, segment, history, o + i, j, -1, workspace, own, own_rows)
+            asked = mine if switches else np.int64(-1)
+            value, who = at_stage(model, member_state, segment, history, o + i, j, asked, workspace, own, own_rows)
             turned = np.bool_(False)
             if bends and o + i != inside:
                 value, who, turned = one_sided(
@@ -566,8 +608,14 @@ def integral_cotangents(
             total += weight[i] * (value * value if square else value)
             if not gradient:
                 continue
+            weighed = 0.0
             if energy:
-                add_design(model, segment, t, member_state, q, v, a, none, factor, out, work)
+                weighed = energy_weight(
+                    model, member_state, segment, j, who, t, q, v, a, history.lam[o + i], workspace
+                )  # fmt: skip
+                if turned:
+                    weighed = -weighed
+                add_design(model, segment, t, member_state, q, v, a, none, factor * weighed, out, work)
             shares = ties if who == mine and ties > 1 else 1
             factor /= shares
             bars[o + i] = 0.0
@@ -587,5 +635,7 @@ def integral_cotangents(
                     sign = -sign
                 explicit_part(model, segment, j, who, t, member_state, q, v, a, factor * sign, out)
                 if sets_bar.shape[1] > 0:
-                    add_looked_sets(model, member_state, segment, j, who, t, q, v, a, own, factor, sets_bar[o + i])
+                    add_looked_sets(
+                        model, member_state, segment, j, who, t, q, v, a, own, weighed, factor, sets_bar[o + i]
+                    )  # fmt: skip
     return total

@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
+from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import GROUND, Case, LoadCase, Response, ResponseRow
 from mdstopo.case.responses import kind_of
 from mdstopo.general import responses as responses_of
 from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in_frame
-from mdstopo.general.drives import drives, drives_all, motion_times
+from mdstopo.general.drives import Drives, drives, drives_all, motion_times
+from mdstopo.general.expression_rows import expression_codes, expression_data
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel
+from mdstopo.general.timed_loads import kink_times, parts_of, timed_loads
 from mdstopo.general.variables import (
     adds_damping,
     along,
@@ -25,6 +27,7 @@ from mdstopo.general.variables import (
 )
 from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
+from mdstopo.mechanics.kinematics.timed import ADDRESS
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.bodies import distances, stands_as
 from mdstopo.scene.grids import row_of
@@ -94,13 +97,18 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         v0[own] = dimension.velocities(body, home[i])
 
     fine = has_coarse_steps(case.solver)
-    more = lasting_times(case, fine) + motion_times(load_case, dimension) + watched_times(case, load_case)
+    more = (
+        kink_times(case, load_case)
+        + lasting_times(case, fine)
+        + motion_times(load_case, dimension)
+        + watched_times(case, load_case)
+    )
     times = breakpoints(load_case, more)
-    driven, drive, frames_of_turns, turns = drives(load_case, times, dimension, dimension.stated(home), v0, home)
-    _refuse_impacts(case, load_case, bodies, driven, drive, times)
+    made = drives(load_case, times, dimension, dimension.stated(home), v0, home)
+    _refuse_impacts(case, load_case, bodies, made, times)
     free = np.ones(n, dtype=np.int64)
     free[-each:] = 0
-    free[driven] = 0
+    free[made.driven] = 0
 
     pairs: Pairs = {}
     moved = None if stands_as(case, load_case) else home
@@ -117,8 +125,10 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     for p, far in zip(contact_pair.tolist(), dimension.reaches(contact).tolist(), strict=True):
         reach[p] = max(reach[p], far)
     loads = dimension.loads(load_case, index, times, frames)
+    timed = timed_loads(parts_of(load_case, lambda load: dimension.timed(load, frames), index), times)
     responses, reductions = looked_at(case, load_case.name)
-    response, response_par = _responses(case, dimension, frames, responses, index)
+    response, response_par, curves = _responses(case, dimension, frames, responses, index, members["curves"])
+    members["curves"] = curves
     steady = [dimension.joint_kernels(type(each)).steady for each in case.joints]
     layout = arrange(case, joint, joint_par, steady, free, mass, home, pair, bodies)
     _refuse_redundant(case, load_case, layout.redundant)
@@ -127,9 +137,10 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     entries = varied(case, members["block"])
     model = GeneralModel(
         free=free, mass=mass, q0=np.tile(bodies.at_home, len(names)), v0=v0, home=home, pair=pair, reach=reach,
-        **members, times=times, **loads._asdict(), bushing_pair=bushing_pair, bushing=bushing, driven=driven,
-        drive=drive, drive_frame=frames_of_turns, drive_turn=turns, joint=joint, joint_par=joint_par, row=layout.row,
-        place=layout.place,
+        **members, times=times, **loads._asdict(), **timed._asdict(),
+        driven_par=made.formulas, driven_mode=made.modes, bushing_pair=bushing_pair, bushing=bushing,
+        driven=made.driven, drive=made.cubics, drive_frame=made.frames, drive_turn=made.turns,
+        joint=joint, joint_par=joint_par, row=layout.row, place=layout.place,
         size=np.array(
             [*layout.size, int(by_order_8), len(layout.steady), bodies.load_slopes, bodies.attitude], dtype=np.int64
         ), line=layout.line,
@@ -144,32 +155,45 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     )  # fmt: skip
 
 
-def _refuse_impacts(
-    case: Case, load_case: LoadCase, bodies: Kinematics, driven: IndexArray, drive: FloatArray, times: FloatArray
-) -> None:
-    """A driven velocity that jumps would need an infinite force in a joint (CaseError).
+def _refuse_impacts(case: Case, load_case: LoadCase, bodies: Kinematics, made: Drives, times: FloatArray) -> None:
+    """A driven position that jumps is no motion; a velocity that does needs an infinite force in a joint (CaseError).
 
     case, load_case: the scene.
     bodies: how they move.
-    driven (n_driven,), drive (n_seg, n_driven, 4), times (n_seg + 1,): as in `GeneralModel`.
+    made: what is driven. times (n_seg + 1,): ends of the segments (s).
     """
+    driven, drive = made.driven, made.cubics
+    formulas = set(np.flatnonzero(made.formulas[:, ADDRESS]).tolist())
     names = [body.name for body in case.bodies]
     jointed = {name for joint in case.joints for name in joint.bodies}
     h = np.diff(times)[:-1, None]
-    before = drive[:-1, :, 1] + h * (2.0 * drive[:-1, :, 2] + 3.0 * h * drive[:-1, :, 3])
+    d = drive[:-1]
+    reached = d[..., 0] + h * (d[..., 1] + h * (d[..., 2] + h * d[..., 3]))
+    leap = np.abs(drive[1:, :, 0] - reached)
+    extent = np.abs(drive[:, :, 0]).max(axis=0, initial=0.0) + 1e-300
+    before = d[..., 1] + h * (2.0 * d[..., 2] + 3.0 * h * d[..., 3])
     jump = np.abs(drive[1:, :, 1] - before)
     size = np.abs(drive[:, :, 1]).max(axis=0, initial=0.0) + 1e-300
     mistakes = []
     for i, d in enumerate(driven.tolist()):
         name = names[d // bodies.freedoms]
-        if name in jointed and len(jump) and jump[:, i].max() > 1e-9 * size[i]:
+        leaps = len(jump) > 0 and leap[:, i].max() > 1e-9 * extent[i] and i in formulas
+        if leaps:
+            when = times[1 + int(leap[:, i].argmax())]
+            mistakes.append(_of_motions(case, load_case, f"the prescribed position of {name} jumps at t = {when:g} s"))
+        elif name in jointed and len(jump) and jump[:, i].max() > 1e-9 * size[i]:
             when = times[1 + int(jump[:, i].argmax())]
-            places = [f"load_cases.{load_case.name}.motions", "motions"]
-            path = next((path for path in places if path in case.marks), "motions")
             message = f"the prescribed velocity of {name} jumps at t = {when:g} s, but it is jointed: that is an impact"
-            mistakes.append(case.marks.mistake(path, message))
+            mistakes.append(_of_motions(case, load_case, message))
     if mistakes:
         raise CaseError(mistakes, str(case.path or case.name))
+
+
+def _of_motions(case: Case, load_case: LoadCase, message: str) -> Mistake:
+    """A mistake of the motions of a load case."""
+    places = [f"load_cases.{load_case.name}.motions", "motions"]
+    path = next((path for path in places if path in case.marks), "motions")
+    return case.marks.mistake(path, message)
 
 
 def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...]) -> None:
@@ -178,12 +202,12 @@ def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...
     rows: list[tuple[str, Any]] = [(f"objectives.{o.name}", o) for o in case.objectives]
     rows += [(f"constraints[{i}]", row) for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)]
     for path, looked in rows:
-        name = looked.response.joint
-        if looked.load_case == load_case.name and name in redundant:
+        names = [each.joint for each in looked.response.looked if each.joint in redundant]
+        if looked.load_case == load_case.name and names:
             mistakes.append(
                 case.marks.mistake(
                     f"{path}.response",
-                    f"joint {name} has rows that others imply at the start; what it transmits is not determined",
+                    f"joint {names[0]} has rows that others imply at the start; what it transmits is not determined",
                 )
             )
     if mistakes:
@@ -304,13 +328,33 @@ def _reach(
 
 
 def _responses(
-    case: Case, dimension: Dimension, frames: Frames, responses: tuple[Response, ...], index: dict[str, int]
-) -> tuple[IndexArray, FloatArray]:
-    """The columns (n_resp, 6) and numbers of each response (`GeneralModel.response`, `response_par`)."""
+    case: Case,
+    dimension: Dimension,
+    frames: Frames,
+    responses: tuple[Response, ...],
+    index: dict[str, int],
+    curves: FloatArray,
+) -> tuple[IndexArray, FloatArray, FloatArray]:
+    """The columns (n_resp, 6) and numbers of each response (`GeneralModel.response`, `response_par`), and the data of
+    laws with those of expressions behind them. Responses that expressions are of stand behind the others.
+
+    case, dimension, frames: the case, and what belongs to its dimension.
+    responses: what is looked at.
+    index: number of each body.
+    curves: data of laws.
+    """
     codes, rows = [], []
+    parts = [part for response in responses for _, part in response.of]
+    data, first = curves.tolist(), len(responses)
     groups = [group.name for group in case.members]
     named = [joint.name for joint in case.joints]
-    for response in responses:
+    for response in (*responses, *parts):
+        if response.of:
+            codes.append(expression_codes(response, first))
+            rows.append([float(len(data)), *[0.0] * (dimension.response_par - 1)])
+            data += expression_data(response)
+            first += len(response.of)
+            continue
         record = kind_of(response)
         code = responses_of.code_of(record)
         body = index[response.body or GROUND]
@@ -326,7 +370,7 @@ def _responses(
         codes.append([code, body, reference, component, record.order, subject])
         rows.append(dimension.response_row(response, frames))
     par = np.array(rows, dtype=np.float64).reshape(-1, dimension.response_par)
-    return np.array(codes, dtype=np.int64).reshape(-1, 6), par
+    return np.array(codes, dtype=np.int64).reshape(-1, 6), par, np.array(data, dtype=np.float64)
 
 
 def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, ...]) -> bool:
@@ -334,8 +378,9 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
     forces = any(law.depends_on_rate for group in case.members for law in group.laws)
     bushed = any(any(bushing.damping) for bushing in case.bushings)
     looks = any(
-        over_time in ("mean", "rms", "integral") and kind_of(response).depends_on_rate
+        over_time in ("mean", "rms", "integral") and kind_of(each).depends_on_rate
         for response, over_time in zip(responses, reductions, strict=True)
+        for each in response.looked
     )
     return forces or adds_damping(case) or bushed or looks or bool(case.joints) or bool(case.contacts)
 

@@ -7,15 +7,15 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.method_interface import beside, derivatives, is_continuous, point_of
-from mdstopo.general.model import KIND, SUBJECT, unpack_general
+from mdstopo.general.model import SUBJECT, unpack_general
 from mdstopo.general.responses import (
     APART,
-    MEMBER_FORCE,
+    chosen_part,
     follows_state,
     group_forces,
     group_rates,
+    is_chosen,
     is_plain,
-    largest_force,
     rated,
 )
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
@@ -79,11 +79,11 @@ def evaluate_here(tag, motion, j, k, c, who, rates, balanced, purpose):
     q, v, a, lam = motion.q, motion.v, motion.a, motion.lam
     model = motion.model
     found = 0
-    if j >= 0 and model.response[j, KIND] == MEMBER_FORCE and who < 0:
+    if j >= 0 and who < 0 and is_chosen(model, j):
         found = 1
         segment = motion.history.index[k, SEGMENT]
         solve_accelerations(model, motion.member_state, segment, t, q, v, np.bool_(False), motion.workspace, a, lam)
-        who = largest_force(model, motion.member_state, segment, t, model.response[j, SUBJECT], q, v, a)
+        who = chosen_part(model, motion.member_state, segment, j, who, t, q, v, a, lam, motion.workspace)
     value, rate, made = rated(
         tag, model, motion.member_state, motion.history, k, c, j, who, rates, balanced, t, q, v, motion.workspace, a,
         lam, motion.bars, motion.row_bar, motion.near_q, motion.near, motion.own,

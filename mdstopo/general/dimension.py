@@ -1,10 +1,11 @@
 """What differs between scenes in a plane and in space when a case becomes arrays: one record of functions for each."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from mdstopo.case.model import Case, Joint, LoadCase, Response
+from mdstopo.case.model import Case, Joint, Load, LoadCase, Response
+from mdstopo.general.timed_loads import TimedPart
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.loads import Loads
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -40,7 +41,8 @@ class Dimension:
     masses (body): mass of each freedom. velocities (body, row of home): those of its freedoms at the start.
     stated (home): (n,) where each freedom is at home, from which stated positions are measured; 0 of turns.
     places (home, body, points): global places (K, d) at home of points (K, d) of a body, in the axes of arrays.
-    loads (load_case, index, times, frames): as arrays. bushings (case, index, pairs, home): as arrays.
+    loads (load_case, index, times, frames): as arrays. timed (load, frames): its parts that are formulas.
+    bushings (case, index, pairs, home): as arrays.
     half_turn (pairs, home, q): the first of the states q (T, n_q) at which one of the pairs (K, 2) of bodies has turned
     by half a turn, where that may not be, and which; None where none has. contacts (case, index, pairs, frames): as
     arrays, and in words. reaches (contact): (n_contact,) how far the point of each contact is from
@@ -62,6 +64,7 @@ class Dimension:
     stated: Callable[[FloatArray], FloatArray]
     places: Callable[[FloatArray, int, FloatArray], FloatArray]
     loads: Callable[[LoadCase, dict[str, int], FloatArray, Frames], Loads]
+    timed: Callable[[Load, Frames], Iterable[TimedPart]]
     bushings: Callable[[Case, dict[str, int], Pairs, FloatArray], tuple[IndexArray, FloatArray]]
     half_turn: Callable[[IndexArray, FloatArray, FloatArray], tuple[int, int] | None]
     contacts: Callable[[Case, dict[str, int], Pairs, Frames], tuple[IndexArray, FloatArray, tuple[str, ...]]]

@@ -8,21 +8,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import LoadCase, Motion, Prescribed, Table
 from mdstopo.case.spline import slopes
 from mdstopo.general.dimension import Dimension
+from mdstopo.general.timed_loads import at_ends, modes, row_of_formula
 from mdstopo.mechanics.kinematics.spatial_drives import FRAME, ROW
+from mdstopo.mechanics.kinematics.timed import WIDTH
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.signals import segment_values
 
 
 class Drives(NamedTuple):
-    """What is driven (`GeneralModel.driven`, `drive`, `drive_frame`, `drive_turn`)."""
+    """What is driven (`GeneralModel.driven`, `drive`, `drive_frame`, `drive_turn`, `driven_par`, `driven_mode`)."""
 
     driven: IndexArray
     cubics: FloatArray
     frames: FloatArray
     turns: FloatArray
+    formulas: FloatArray
+    modes: IndexArray
 
 
 def drives_all(motion: Motion, dimension: Dimension) -> bool:
@@ -65,6 +70,7 @@ def drives(
     each = dimension.kinematics.freedoms
     driven: list[int] = []
     cubics: list[FloatArray] = []
+    formulas: dict[int, TimeFormula] = {}
     frames = np.zeros((0, FRAME))
     turns = np.zeros((0, ROW))
     for motion in load_case.motions:
@@ -72,6 +78,8 @@ def drives(
         for d, word in enumerate(dimension.axes, each * body):
             part: Prescribed | None = getattr(motion, word)
             if part is not None:
+                if isinstance(part.signal, TimeFormula):
+                    formulas[len(driven)] = part.signal.shifted(-float(home[d]))
                 driven.append(d)
                 cubics.append(cubics_of(part, times, float(home[d]), float(v0[d])))
         if motion.rotation is not None:
@@ -80,13 +88,19 @@ def drives(
             assert attitudes is not None
             first = each * (body + 1) - 3
             found = turning_of(motion.rotation, times, attitudes[body], v0[first : first + 3])
+            for k, angle in enumerate(motion.rotation.angles):
+                if isinstance(angle.signal, TimeFormula):
+                    formulas[len(driven) + k] = angle.signal
             driven += [first, first + 1, first + 2]
             cubics += list(found.cubics.transpose(1, 0, 2))
             ends = float(len(turns)), float(len(turns) + len(found.rows))
             frames = np.vstack([frames, [*found.frame, *ends]])
             turns = np.vstack([turns, found.rows])
     whole = np.array(cubics).reshape(len(cubics), len(times) - 1, 4).transpose(1, 0, 2)
-    return Drives(np.array(driven, dtype=np.int64), np.ascontiguousarray(whole), frames, turns)
+    rows, sides = np.zeros((len(driven), WIDTH)), np.zeros((len(times) - 1, len(driven)), dtype=np.int64)
+    for i, formula in formulas.items():
+        rows[i], sides[:, i] = row_of_formula(formula), modes(formula, times)
+    return Drives(np.array(driven, dtype=np.int64), np.ascontiguousarray(whole), frames, turns, rows, sides)
 
 
 def cubics_of(part: Prescribed, times: FloatArray, home: float, rate: float) -> FloatArray:
@@ -94,6 +108,10 @@ def cubics_of(part: Prescribed, times: FloatArray, home: float, rate: float) -> 
 
     rate: at the start, from which an acceleration is integrated.
     """
+    if isinstance(part.signal, TimeFormula):
+        ends = at_ends(part.signal.shifted(-home), times)
+        # kernels call the formula; these are for those who ask where, and how fast, it is at a segment's ends
+        return _cubics_between(ends, np.diff(times))
     if part.kind == "position":
         return _spline_cubics(part.signal, times, home)
     out = np.zeros((len(times) - 1, 4))
@@ -110,6 +128,14 @@ def cubics_of(part: Prescribed, times: FloatArray, home: float, rate: float) -> 
         position = cubic[0] + h * (cubic[1] + h * (cubic[2] + h * cubic[3]))
         velocity = cubic[1] + h * (2.0 * cubic[2] + 3.0 * h * cubic[3])
     return out
+
+
+def _cubics_between(ends: FloatArray, h: FloatArray) -> FloatArray:
+    """(n_seg, 4): cubics with values and rates (n_seg, 2, 2) at both ends of segments of lengths h (n_seg,)."""
+    x, v = ends[:, :, 0], ends[:, :, 1]
+    slope = (x[:, 1] - x[:, 0]) / h
+    c2 = (3.0 * slope - 2.0 * v[:, 0] - v[:, 1]) / h
+    return np.stack([x[:, 0], v[:, 0], c2, (v[:, 0] + v[:, 1] - 2.0 * slope) / h**2], axis=1)
 
 
 def _spline_cubics(signal: object, times: FloatArray, home: float) -> FloatArray:

@@ -11,13 +11,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mdstopo.general.expressions import MARGINS
 from mdstopo.scene.model import FloatArray
 
 #: columns of a row: time, value, step, fraction of it, rate on this side, sign of what is largest, member; and where
 #: two members change hands there (`minima`), the other one and its share of the derivative
 TIME, VALUE, STEP, FRACTION, RATE, SIGN, WHO, OTHER, SHARE = range(9)
 COLUMNS = 9
-#: in column OTHER in place of a member: there is none; the value is a zero, and stays one for designs nearby
+#: in column OTHER in place of a member: there is none; the value is a zero, and stays one for designs nearby. One from
+#: MARGINS on (`expressions`) is the margin of a switch that changes there, whose derivative is added
 NOBODY, ZERO = -1.0, -2.0
 #: samples of every step
 FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -55,4 +57,4 @@ def parts(row: FloatArray) -> list[tuple[float, FloatArray]]:
         return [(1.0, row)]
     other, share = row.copy(), row.item(SHARE)
     other[WHO], other[OTHER] = who, NOBODY
-    return [(1.0 - share, row), (share, other)]
+    return [(1.0 if who >= MARGINS else 1.0 - share, row), (share, other)]

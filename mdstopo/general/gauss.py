@@ -158,6 +158,8 @@ def begin_nodes(model, v0, nodes):
 @kernel
 def is_steady(model, segment):
     """Whether loads and tabulated forces do not change in a segment."""
+    if model.timed_load.shape[0] > 0:
+        return np.bool_(False)
     changes = 0.0
     for d in range(model.force.shape[1]):
         changes = max(changes, abs(model.force[segment, d, 1]))
@@ -166,7 +168,7 @@ def is_steady(model, segment):
             changes = max(changes, abs(model.load_force[segment, k, c, 1]))
     for k in range(model.block.shape[0]):
         changes = max(changes, abs(model.level[segment, k, 1]))
-    return changes == 0.0
+    return np.bool_(changes == 0.0)
 
 
 @kernel

@@ -23,18 +23,21 @@ from mdstopo.general.extremes import (
     LAST,
     SIGN,
     STEP,
+    TIME,
     VALUE,
     row_of,
 )
 from mdstopo.general.kinks import landed
-from mdstopo.general.minima import minima
+from mdstopo.general.minima import Pieces, minima
 from mdstopo.general.model import COUNT, GROUP, INERTER, JOINT_FIRST, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.quadrature_breakpoints import INTEGRALS, ROUNDS, quadrature_breakpoints, reduced
 from mdstopo.general.ready import Ready
+from mdstopo.general.responses import switches_of
 from mdstopo.general.row_gradients import RowGradients
 from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.step_history import FACTORS, GRAZES, WINDOWS, history_room
+from mdstopo.general.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.turning_drives import global_moments
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
@@ -63,6 +66,8 @@ if TYPE_CHECKING:
 ROWS = 6
 #: reductions that take the peaks of g, and whether those of -g too; minima are found in `minima`
 PEAKS = {"max": False, "max_abs": True}
+#: of which peaks: those of g, of -g
+SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
 #: growth of the room for steps below which a run ends instead
 WORTH = 1.05
 #: for peaks of whole steps
@@ -112,6 +117,8 @@ class GeneralDriver:
         self._make_rows(ROWS)
         self.start_vjp = np.zeros(n if case.solver.settle else 0)
         self.events = 0
+        #: what jumps of integrands do to the gradients of their integrals (`switch_pieces`)
+        self.jumps: dict[int, list[tuple[float, FloatArray]]] = {}
         #: where the steps of the last evaluation had to end
         self.quadrature_breakpoints: list[float] = []
         self._inertial = bool(np.any(model.block[:, 3] == INERTER))
@@ -236,6 +243,7 @@ class GeneralDriver:
                 break
             self.quadrature_breakpoints = self.quadrature_breakpoints + more
             code, count, time = self.run(alpha, gradient, self.quadrature_breakpoints)
+        self.jumps = {}
         status, message = status_of(code), self.rotation_jump(count) if code == OK else ""
         if message:
             status = Status.ROTATION_JUMP
@@ -244,19 +252,35 @@ class GeneralDriver:
                 self._look(j, name, count, gradient, window)
             if gradient:
                 self._row_gradients(count, across)
+            status, message = self._without_value(gradient)
         grazing, meeting = self._grazing(), int(self.where[1])
         return ResponseResult(
             status, time, self.rows, self.found, self.gradients, meeting, grazing, across, message=message
         )
+
+    def _without_value(self, gradient: bool) -> tuple[Status, str]:
+        """Whether expressions that are looked at have values, and gradients where wanted; which has none, and when."""
+        for j, response in enumerate(self.scene.responses):
+            if not response.of:
+                continue
+            found = self.rows[j, : self.found[j]]
+            none = found[~np.isfinite(found[:, VALUE])]
+            if len(none):
+                when = f" at t = {none[0, TIME]:.6g} s" if np.isfinite(none[0, TIME]) else ""
+                return Status.NON_FINITE, f"the expression {response.formula} has no value{when}"
+            if gradient and not np.all(np.isfinite(self.gradients[j, : self.found[j]])):
+                return Status.NO_GRADIENT, f"the expression {response.formula} has an infinite slope"
+        return Status.OK, ""
 
     @cached_property
     def _rotations(self) -> dict[tuple[str, str], IndexArray]:
         """Numbers of observer and body, by their names, of rotations that are looked at before the end."""
         bodies, found = self.scene.bodies, {}
         for response, reduction in zip(self.scene.responses, self.scene.reductions, strict=True):
-            if kind_of(response).jumps and reduction != "final":
-                pair = response.relative_to or GROUND, response.body or GROUND
-                found[pair] = np.array([bodies.index(name) for name in pair])
+            for each in response.looked:
+                if kind_of(each).jumps and reduction != "final":
+                    pair = each.relative_to or GROUND, each.body or GROUND
+                    found[pair] = np.array([bodies.index(name) for name in pair])
         return found
 
     def rotation_jump(self, count: int) -> str:
@@ -306,14 +330,20 @@ class GeneralDriver:
             rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
             self.gradients[j, 0] *= slope
             self.found[j] = 1
+            if switches_of(self.scene.model, j):
+                self.jumps[j] = switched_integral(self, j, Pieces(self, j, t[: count + 1].copy()), reduction, slope)
             return
 
         competing = compete(self.scene.model.response[j, 0], reduction)
-        if not competing and reduction in PEAKS:
+        switched = switches_of(self.scene.model, j) > 0 and reduction in SIGNS
+        if not competing and not switched and reduction in PEAKS:
             found = self._peaks_of_steps(j, PEAKS[reduction], count, window)
         else:
             t = t[: count + 1].copy()
-            if competing:
+            if switched:
+                signs = SIGNS[reduction]
+                candidates = switched_peaks(self, j, Pieces(self, j, t), signs, window)
+            elif competing:
                 candidates = members_peaks(self, j, t, reduction == "final", window, len(rows))
             elif reduction == "final":
                 value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()

@@ -16,7 +16,7 @@ import numpy as np
 from mdstopo.general.extremes import FRACTION, STEP, VALUE, EvaluateAt
 from mdstopo.general.minima import LOW, Pieces
 from mdstopo.general.model import GeneralModel
-from mdstopo.general.responses import has_norm
+from mdstopo.general.responses import has_kinks, has_norm, is_expression
 from mdstopo.scene.model import FloatArray
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
     if highest == 0.0:
         return []
     found = list(pieces.changes)
+    if not has_kinks(driver.scene.model, j):
+        return found
     rate = float(np.abs(rates).max())
     for row in pieces.minima(1e9):
         low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
@@ -48,11 +50,16 @@ def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
         time = float(pieces.t[w] + c * (pieces.t[w + 1] - pieces.t[w]))
         found.append(time)
         around = _around(time, low, rate, float(t[0]), float(t[-1]))
-        if not around and has_norm(driver.scene.model, j):
+        if not around and turns_round(driver.scene.model, j):
             beside = BESIDE * float(pieces.t[w + 1] - pieces.t[w])
             around = [each for each in (time - beside, time + beside) if t[0] < each < t[-1]]
         found += around
     return found
+
+
+def turns_round(model: GeneralModel, j: int) -> bool:
+    """Whether response j is the norm of a vector, or a root of an expression, which all but vanishes beside a zero."""
+    return has_norm(model, j) or is_expression(model, j)
 
 
 def _sharpened(w: int, c: float, evaluate_at: EvaluateAt) -> float:
@@ -114,6 +121,8 @@ def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
     return model._replace(
         times=whole,
         active=model.active[parent],
+        timed_mode=model.timed_mode[parent],
+        driven_mode=model.driven_mode[parent],
         level=linear(model.level),
         force=linear(model.force),
         load_force=linear(model.load_force),

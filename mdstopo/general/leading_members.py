@@ -39,7 +39,7 @@ TRIALS = 4
 
 
 class Lead(NamedTuple):
-    """A member leads from fraction `low` to fraction `high` of a step."""
+    """A member leads from fraction `low` to `high` of a step, or the switches of an expression are as it says."""
 
     step: int
     low: float
@@ -149,7 +149,7 @@ def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who:
         for a, b in combinations(near.tolist(), 2):
             for sign in (1.0, -1.0):
                 cuts += _roots(force, rate, k, a, b, sign, exact)
-    ends = np.array([*_apart(sorted(cuts)), 1.0])
+    ends = np.array([*apart(sorted(cuts)), 1.0])
     middles = 0.5 * (ends[:-1] + ends[1:])
     # the exact forces in the middle of each piece say who leads there; mostly the whole step is one piece
     size = np.abs(exact(middles, np.arange(len(who))))
@@ -163,7 +163,7 @@ def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who:
     return found
 
 
-def _apart(cuts: list[float]) -> list[float]:
+def apart(cuts: list[float]) -> list[float]:
     """Cuts, rising from 0, without those that leave next to nothing of the step before or behind them."""
     kept = cuts[:1]
     for cut in cuts[1:]:
@@ -198,9 +198,28 @@ def _roots(
     low, high = float(FINE[k]), float(FINE[k + 1])
     pair = np.array([a, b])
 
+    def differences(c: FloatArray) -> FloatArray:
+        f = exact(c, pair)
+        return np.asarray(f[0] - sign * f[1])
+
+    yield from roots_between((low, high), (d0, d1), (s0, s1), differences)
+
+
+def roots_between(
+    span: tuple[float, float],
+    values: tuple[float, float],
+    rates: tuple[float, float],
+    exact: Callable[[FloatArray], FloatArray],
+) -> Iterator[float]:
+    """Fractions of a step, between two samples, at which a smooth function of time vanishes.
+
+    span: the fractions of the samples. values: what it is at them. rates: its rates, per interval between them.
+    exact: values (K,) at fractions (K,), on the motion itself.
+    """
+    (low, high), (d0, d1), (s0, s1) = span, values, rates
+
     def difference(c: float) -> float:
-        f = exact(np.array([c]), pair)
-        return float(f[0, 0] - sign * f[1, 0])
+        return float(exact(np.array([c]))[0])
 
     if (d0 >= 0.0) != (d1 >= 0.0):
         yield from _bracketed(difference, low, high)
@@ -217,18 +236,17 @@ def _roots(
     width = 0.02 * (high - low)
     for _ in range(TRIALS):
         near = np.clip(np.array([c - width, c, c + width]), low, high)
-        f = exact(near, pair)
-        values = f[0] - sign * f[1]
-        beyond = np.flatnonzero(values * d0 < 0.0)
+        seen = exact(near)
+        beyond = np.flatnonzero(seen * d0 < 0.0)
         if len(beyond):
             middle = float(near[beyond[0]])
             yield from _bracketed(difference, low, middle)
             yield from _bracketed(difference, middle, high)
             return
-        bend = values[0] - 2.0 * values[1] + values[2]
+        bend = seen[0] - 2.0 * seen[1] + seen[2]
         if bend == 0.0:
             return
-        c = float(np.clip(c + 0.5 * width * (values[0] - values[2]) / bend, low, high))
+        c = float(np.clip(c + 0.5 * width * (seen[0] - seen[2]) / bend, low, high))
         width *= 0.1
 
 

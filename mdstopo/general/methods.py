@@ -35,7 +35,6 @@ def differentiate(
     driver.work += before
     for j, reduction in enumerate(driver.scene.reductions):
         for r in range(int(looked.found[j])):
-            integral = INTEGRALS.get(reduction, 0)
             if method == "constant_load":
                 gradients[j, r] = _held(driver, j, rows[j, r], reduction, count)
                 continue
@@ -43,21 +42,19 @@ def differentiate(
             aims = [(False, gradients[j, r])]
             if across is not None and driver.shapes[j] == "norm":
                 aims.append((True, across[j, r]))
-            for share, part in parts(rows[j, r]):
+            for integrated, factor, part in _summands(driver, j, rows[j, r], reduction):
                 for aside, out in aims:
                     own = np.zeros(gradients.shape[2])
                     stopped = driver.entry.push(
-                        *driver.steps_arguments(count), j, integral, sweeps, part, aside, driver.room, driver.room_ints,
-                        driver.member_state, driver.padded, own, driver.start_slopes(), driver.work,
+                        *driver.steps_arguments(count), j, integrated, sweeps, part, aside, driver.room,
+                        driver.room_ints, driver.member_state, driver.padded, own, driver.start_slopes(), driver.work,
                     )  # fmt: skip
                     if stopped >= 0:
                         message = FALLBACK.format(float(driver.states()[0][stopped]))
                         return differentiate(driver, "direct", alpha, looked, across)[0], message
-                    _add_since_settled(driver, j, part, aside, integral, count, own)
-                    out += share * own
-            if integral:
-                gradients[j, r] *= rows[j, r, RATE]
-            elif reduction == "max_abs":
+                    _add_since_settled(driver, j, part, aside, integrated, count, own)
+                    out += factor * own
+            if reduction == "max_abs":
                 gradients[j, r] *= rows[j, r, SIGN]
     return gradients, message
 
@@ -79,6 +76,16 @@ def _add_since_settled(
     driver.start.vjp(pulled, out)
 
 
+def _summands(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str) -> list[tuple[int, float, FloatArray]]:
+    """What a row's derivative is put together from: 1 or 2 for an integral (of the square), factors, and rows.
+
+    driver: with a finished run. j, row, reduction: the response, its row, how it is reduced over time.
+    """
+    integral = INTEGRALS.get(reduction, 0)
+    found = [(integral, row.item(RATE) * share if integral else share, part) for share, part in parts(row)]
+    return found + [(0, factor, at) for factor, at in driver.jumps.get(j, [])]
+
+
 def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, count: int) -> FloatArray:
     """A row's gradient (N,) by constant dynamic loading; an integral's at the steps' ends, by the trapezoidal rule."""
     t = driver.states()[0][: count + 1].copy()
@@ -98,7 +105,10 @@ def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, coun
         factor = 2.0 * seen[0] if reduction == "rms" else 1.0
         values[k] = weight * (seen[0] ** 2 if reduction == "rms" else seen[0])
         total += weight * factor * _held_at(driver, j, at, count)
-    return total * reduced(reduction, float(values.sum()), float(t[-1] - t[0]))[1]
+    total *= reduced(reduction, float(values.sum()), float(t[-1] - t[0]))[1]
+    for factor, at in driver.jumps.get(j, []):
+        total += factor * _held_at(driver, j, at, count)
+    return total
 
 
 def _held_at(driver: "GeneralDriver", j: int, row: FloatArray, count: int) -> FloatArray:

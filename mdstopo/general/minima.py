@@ -24,10 +24,12 @@ from mdstopo.general.extremes import (
     VALUE,
     WHO,
     ZERO,
+    row_of,
     sample,
 )
 from mdstopo.general.leading_members import Lead, changes, is_led, leads
-from mdstopo.general.responses import has_kinks
+from mdstopo.general.responses import has_kinks, switches_of
+from mdstopo.general.switch_pieces import switch_leads
 from mdstopo.integrators.driver import CLOSENESS
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -45,15 +47,21 @@ LANDED = 1e-6
 
 
 class Pieces:
-    """The steps of a motion, those in which the largest force changes hands cut there: on each, response j is smooth.
+    """The steps of a motion, cut where the largest force changes hands, or a switch of an expression its side.
+
+    On each, response j is smooth.
 
     t (P + 1,): their times. With `evaluate_at` they are looked at as steps are.
     """
 
     def __init__(self, driver: "GeneralDriver", j: int, t: FloatArray) -> None:
-        self._driver, self._j, self._count = driver, j, len(t) - 1
-        led = is_led(driver, j)
-        self.leads = leads(driver, j, t) if led else [Lead(w, 0.0, 1.0, -1) for w in range(len(t) - 1)]
+        self._driver, self._j, self.count = driver, j, len(t) - 1
+        if is_led(driver, j):
+            self.leads = leads(driver, j, t)
+        elif switches_of(driver.scene.model, j):
+            self.leads = switch_leads(driver, j, t)
+        else:
+            self.leads = [Lead(w, 0.0, 1.0, -1) for w in range(len(t) - 1)]
         self._step = np.array([lead.step for lead in self.leads])
         self._low = np.array([lead.low for lead in self.leads])
         self._high = np.array([lead.high for lead in self.leads])
@@ -68,8 +76,12 @@ class Pieces:
 
     def minima(self, window: float) -> FloatArray:
         """The minima that come near the lowest, as rows (K, COLUMNS) whose places are pieces and fractions of them."""
+        return self.peaks(-1.0, window)
+
+    def peaks(self, sign: float, window: float) -> FloatArray:
+        """The peaks of sign times g that come near the highest, as `minima` has them."""
         pieces = np.column_stack([self._step, self._low, self._high, self._member]).astype(np.float64)
-        return self._driver.peaks_of_pieces(self._j, self._count, self.t, self.samples, -1.0, window, pieces)
+        return self._driver.peaks_of_pieces(self._j, self.count, self.t, self.samples, sign, window, pieces)
 
     def evaluate_at(self, places: FloatArray, exact: bool) -> FloatArray:
         """(K, 3) value, rate, member at places (K, 2): pieces and fractions of them."""
@@ -78,7 +90,7 @@ class Pieces:
         out = np.empty((len(k), 3))
         for member in np.unique(self._member[k]).tolist():
             own = self._member[k] == member
-            out[own] = self._driver.sample_response(self._j, real[own], exact, self._count, who=member)[2]
+            out[own] = self._driver.sample_response(self._j, real[own], exact, self.count, who=member)[2]
         return out
 
     def fraction(self, k: IndexArray, c: FloatArray) -> FloatArray:
@@ -89,9 +101,33 @@ class Pieces:
     def value(self, k: int, fractions: FloatArray) -> FloatArray:
         """Values at fractions of the step that piece k is in, of the member that leads there."""
         real = np.column_stack([np.full(len(fractions), float(self._step[k])), fractions])
-        seen = self._driver.sample_response(self._j, real, True, self._count, who=int(self._member[k]), rates=False)[2]
+        seen = self._driver.sample_response(self._j, real, True, self.count, who=int(self._member[k]), rates=False)[2]
         value: FloatArray = seen[:, 0]
         return value
+
+    def place_before(self, b: int) -> FloatArray:
+        """(2,): step and fraction where the piece in front of piece b ends."""
+        return np.array([float(self.leads[b - 1].step), self.leads[b - 1].high])
+
+    def row_before(self, b: int) -> FloatArray:
+        """A row of `extremes` there, of no value and no member."""
+        step, fraction = self.place_before(b).tolist()
+        return row_of(float(self.t[b]), 0.0, step, fraction, 0.0, 1.0, -1.0)
+
+    def beside(self, b: int) -> tuple[FloatArray, FloatArray]:
+        """Value, rate and member (3,) where the piece in front of piece b ends, and where piece b begins."""
+        before, behind = self.evaluate_at(np.array([[b - 1.0, 1.0], [b, 0.0]]), True)
+        return before, behind
+
+    def is_stated(self, b: int) -> bool:
+        """Whether the time in front of piece b is one of the case's, or an event's."""
+        lead = self.leads[b]
+        if lead.low > 0.0:
+            return False
+        driver = self._driver
+        index = driver.room_ints[: 4 * (int(driver.limits[1]) + 1)].reshape(-1, 4)
+        happened = int(index[lead.step, 3]) - int(index[lead.step - 1, 3])
+        return happened > 0 or bool(np.any(driver.times == self.t[b]))
 
     def settle(self, row: FloatArray, k: int, c: float) -> None:
         """Say in a row of piece k that its place is fraction c of its step."""
@@ -112,7 +148,7 @@ def minima(driver: "GeneralDriver", j: int, t: FloatArray) -> FloatArray:
         pieces.settle(row, k, float(pieces.fraction(np.array([k]), np.array([c]))[0]))
         if c <= 0.0 or c >= 1.0:
             if 0 < between < len(pieces.leads):
-                _at_boundary(row, pieces, between, highest, _stated(driver, pieces, between))
+                _at_boundary(row, pieces, between, highest, pieces.is_stated(between))
         elif bent and row[VALUE] <= LOW * highest:
             _turned_round(row, pieces, k)
     return rows
@@ -123,7 +159,7 @@ def _at_boundary(row: FloatArray, pieces: Pieces, b: int, highest: float, stated
 
     stated: whether the time is given, or an event's: then it varies as that does.
     """
-    before, behind = pieces.evaluate_at(np.array([[b - 1.0, 1.0], [b, 0.0]]), True)
+    before, behind = pieces.beside(b)
     row[VALUE] = (before if row[FRACTION] == pieces.leads[b - 1].high else behind)[0]
     (falls, first), (rises, second) = before[1:].tolist(), behind[1:].tolist()
     if not falls <= 0.0 <= rises or falls == rises:
@@ -133,16 +169,6 @@ def _at_boundary(row: FloatArray, pieces: Pieces, b: int, highest: float, stated
             row[VALUE], row[OTHER] = 0.0, ZERO
     elif not stated:
         row[WHO], row[OTHER], row[SHARE] = first, second, -falls / (rises - falls)
-
-
-def _stated(driver: "GeneralDriver", pieces: Pieces, b: int) -> bool:
-    """Whether the time in front of piece b is one of the case's, or an event's."""
-    lead = pieces.leads[b]
-    if lead.low > 0.0:
-        return False
-    index = driver.room_ints[: 4 * (int(driver.limits[1]) + 1)].reshape(-1, 4)
-    happened = int(index[lead.step, 3]) - int(index[lead.step - 1, 3])
-    return happened > 0 or bool(np.any(driver.times == pieces.t[b]))
 
 
 def _turned_round(row: FloatArray, pieces: Pieces, k: int) -> None:

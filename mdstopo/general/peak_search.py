@@ -30,8 +30,8 @@ from mdstopo.general.extremes import (
     WHO,
 )
 from mdstopo.general.method_interface import is_continuous
-from mdstopo.general.model import KIND, ORDER, unpack_general
-from mdstopo.general.responses import follows_state, kinked, needs_accelerations
+from mdstopo.general.model import ORDER, unpack_general
+from mdstopo.general.responses import follows_state, kinked, needs_balance
 from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES, OF_POINTS, OF_SAMPLES
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic
@@ -187,7 +187,7 @@ def mark_low(motion, j, both, closeness, plain):
     plain (count,): zeros before.
     """
     model, history = motion.model, motion.history
-    if model.size[2] == 0 or (model.response[j, ORDER] == 0 and not needs_accelerations(model.response[j, KIND])):
+    if model.size[2] == 0 or (model.response[j, ORDER] == 0 and not needs_balance(model, j)):
         return
     most = np.empty(motion.count)
     least = np.empty(motion.count)

@@ -40,7 +40,7 @@ from mdstopo.general.model import (
     VARIED_STOP,
     VARIED_VALUE,
 )
-from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
+from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,
@@ -238,7 +238,7 @@ def add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, sc
 
 
 @kernel
-def add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, scale, out):
+def add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, weight, scale, out):
     """Add the derivatives, at fixed motion, of any response by the permanent sets.
 
     Constant:
@@ -251,12 +251,13 @@ def add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, scal
       t: time (s).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       bars (3, n): slopes of the response by q, v, a.
+      weight: its slope by the stored energy (`energy_weight`).
       scale: factor of the derivatives.
     Out:
       out (slots,): derivatives by the sets, added to.
     """
-    if model.response[j, KIND] == ENERGY:
-        add_sets(model, segment, member_state, q, v, np.zeros(v.shape[0]), scale, out)
+    if weight != 0.0:
+        add_sets(model, segment, member_state, q, v, np.zeros(v.shape[0]), scale * weight, out)
     else:
         add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, scale, out)
 

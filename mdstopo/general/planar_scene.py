@@ -1,15 +1,19 @@
 """A case in a plane as arrays of a general scene: what is planar about them (`dimension`)."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import Case, Joint, LoadCase, Response
+from mdstopo.case.arrays import TimeFormula
+from mdstopo.case.model import Case, Joint, Load, LoadCase, Response
 from mdstopo.general.contact_compile import edge_rows
 from mdstopo.general.dimension import Dimension, Frames, Pairs
+from mdstopo.general.timed_loads import TimedPart
 from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.kinematics.planar import PLANAR
+from mdstopo.mechanics.kinematics.timed import MOMENT, PUSH
 from mdstopo.scene.compile import home_of
 from mdstopo.scene.loads import Loads, generalised_loads
 from mdstopo.scene.model import HOME_COS, FloatArray, IndexArray
@@ -42,6 +46,17 @@ def _places(home: FloatArray, body: int, points: FloatArray) -> FloatArray:
 def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames: Frames) -> Loads:
     del frames
     return generalised_loads(load_case, index, times)
+
+
+def _timed(load: Load, frames: Frames) -> Iterator[TimedPart]:
+    """Components of the force, and the moment, that are formulas of time."""
+    del frames
+    follows = int(load.frame == "body")
+    for signal, direction in zip(load.force, ((1.0, 0.0), (0.0, 1.0)), strict=True):
+        if isinstance(signal, TimeFormula):
+            yield TimedPart(signal, PUSH, follows, direction, tuple(load.at_local))
+    if isinstance(load.moment, TimeFormula):
+        yield TimedPart(load.moment, MOMENT, 0, (), ())
 
 
 def _bushings(case: Case, index: dict[str, int], pairs: Pairs, home: FloatArray) -> tuple[IndexArray, FloatArray]:
@@ -86,6 +101,7 @@ PLANE = Dimension(
     stated=_stated,
     places=_places,
     loads=_loads,
+    timed=_timed,
     bushings=_bushings,
     half_turn=lambda pairs, home, q: None,
     contacts=edge_rows,

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.general.kinks import kinks
-from mdstopo.general.responses import LISTED, has_kinks
+from mdstopo.general.responses import LISTED, has_kinks, is_expression, switches_of
 from mdstopo.general.start import size_of
 from mdstopo.general.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
@@ -45,8 +45,8 @@ NOUGHT = 1e-12
 #: steps nearer together than this share of the simulated time are one
 APART = 1e-10
 
-#: places (K, 2) -> values (K,)
-Look = Callable[[FloatArray], FloatArray]
+#: places (K, 2), and between which two ends each is (K,) -> values (K,)
+Look = Callable[[FloatArray, IndexArray], FloatArray]
 
 
 def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
@@ -59,7 +59,7 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
     t = driver.states()[0][: count + 1].copy()
     if not driver.quadrature_breakpoints:
         for j, _ in looked:
-            if has_kinks(model, j):
+            if has_kinks(model, j) or switches_of(model, j):
                 found += kinks(driver, j, t)
     if not driver.method.kind.adaptive or driver.settings[2] > 0.0:
         return found
@@ -67,10 +67,7 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
     ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]
     rule = _rule(driver, count)
     for j, name in looked:
-
-        def look(places: FloatArray, j: int = j, square: bool = INTEGRALS[name] == 2) -> FloatArray:
-            value = driver.sample_response(j, places, False, count, rates=False)[2][:, 0]
-            return value * value if square else value
+        look = _looked(driver, j, t, ends, INTEGRALS[name] == 2)
 
         nothing = _rounding(driver, j, float(t[-1] - t[0]))
         nothing = nothing * nothing if INTEGRALS[name] == 2 else nothing
@@ -84,6 +81,36 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
             driver.method.collocates,
         )
     return found
+
+
+def _looked(driver: "GeneralDriver", j: int, t: FloatArray, ends: FloatArray, square: bool) -> Look:
+    """Values of response j; those of an expression with switches go on between two `ends` as they are in their middle.
+
+    driver: with a finished run. t (m + 1,): its steps' times (s).
+    ends (k + 1,): where steps end or will have to end (s).
+    square: whether their squares are meant.
+    """
+    count = len(t) - 1
+
+    def sample(places: FloatArray, who: int) -> FloatArray:
+        value: FloatArray = driver.sample_response(j, places, False, count, who=who, rates=False)[2][:, 0]
+        return value * value if square else value
+
+    if not switches_of(driver.scene.model, j):
+        return lambda places, within: sample(places, -1)
+    middle = 0.5 * (ends[:-1] + ends[1:])
+    step = np.clip(np.searchsorted(t, middle, side="right") - 1, 0, count - 1)
+    at = np.column_stack([step, (middle - t[step]) / (t[step + 1] - t[step])])
+    sides = driver.sample_response(j, at, False, count, rates=False)[2][:, 2].astype(np.int64)
+
+    def on_sides(places: FloatArray, within: IndexArray) -> FloatArray:
+        value = np.empty(len(places))
+        for side in np.unique(sides[within]).tolist():
+            own = sides[within] == side
+            value[own] = sample(places[own], side)
+        return value
+
+    return on_sides
 
 
 def _rule(driver: "GeneralDriver", count: int) -> FloatArray:
@@ -104,9 +131,9 @@ def _rule(driver: "GeneralDriver", count: int) -> FloatArray:
 def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
     """What response j may be by rounding alone, where that can be said: what joints hold at zero is never more."""
     kind, _, _, _, order, _ = driver.scene.model.response[j].tolist()
-    kernels = LISTED[kind]
-    if kernels.needs_accelerations:
+    if is_expression(driver.scene.model, j) or LISTED[kind].needs_accelerations:
         return 0.0
+    kernels = LISTED[kind]
     of_lengths = kernels.vector is not None and not kernels.vector.is_turn
     return float(NOUGHT * (size_of(driver.case) if of_lengths else 1.0) / span**order)
 
@@ -124,7 +151,7 @@ def halves(
 
     t (m + 1,): ends of the steps (s), all of them among `ends`.
     ends (k + 1,): times at which steps end or will have to end (s).
-    look: values of the integrand (K,) at places (K, 2), steps and fractions of them.
+    look: values of the integrand (K,) at places (K, 2), steps and fractions of them, each between two ends (K,).
     rule (2, s): nodes and weights of the rule on (0, 1).
     tolerance: how far the rule may differ from the Gauss-Legendre sum, relative to the whole integral.
     nothing: up to this the integral counts as zero, and no interval is halved.
@@ -133,7 +160,7 @@ def halves(
     count = rule.shape[1]
     nodes, weights = (FINE_NODES, FINE_WEIGHTS) if collocated else (NODES, WEIGHTS)
     places = np.concatenate([rule[0], 0.5 * (nodes + 1.0)])
-    low, width = ends[:-1], np.diff(ends)
+    low, width, within = ends[:-1], np.diff(ends), np.arange(len(ends) - 1)
     step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
     found: list[float] = []
     whole = np.nan
@@ -142,7 +169,7 @@ def halves(
         times = low[:, None] + width[:, None] * places
         fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
         at = np.stack([np.broadcast_to(step[:, None], fraction.shape), fraction], axis=-1)
-        value = look(at.reshape(-1, 2)).reshape(fraction.shape)
+        value = look(at.reshape(-1, 2), np.repeat(within, len(places))).reshape(fraction.shape)
         sums = width * np.einsum("ij,j->i", value[:, :count], rule[1])
         better = 0.5 * width * np.einsum("ij,j->i", value[:, count:], weights)
         if np.isnan(whole):
@@ -160,7 +187,7 @@ def halves(
         half = 0.5 * width[bad]
         found += (low[bad] + half).tolist()
         low, width = np.concatenate([low[bad], low[bad] + half]), np.concatenate([half, half])
-        step = np.concatenate([step[bad], step[bad]])
+        step, within = np.tile(step[bad], 2), np.tile(within[bad], 2)
     return found
 
 

@@ -18,6 +18,24 @@ from mdstopo.compiler import store
 from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import by_type, kernel, part
 from mdstopo.general.accelerations import gather_multipliers, solve_accelerations
+from mdstopo.general.expressions import (
+    BALANCED,
+    BY_STATE,
+    ENERGETIC,
+    EXPRESSION,
+    FIRST_PART,
+    KNOWN,
+    MARGINS,
+    PARTS,
+    ROOT,
+    SWITCHES,
+    TIMED,
+    formula_mode,
+    formula_value,
+    knows,
+    numbers_of,
+    put_parameters,
+)
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import MODE, SCALE, SET, level_of
 from mdstopo.general.method_interface import beside, derivatives
@@ -120,21 +138,23 @@ def _is_vector(kind):
 
 
 @chosen(LISTED, lambda each: True if each.needs_accelerations else None, part)
-def needs_accelerations(kind):
+def _needs_accelerations(kind):
     """Whether responses of a kind need more than the state: accelerations, multipliers, sums of forces."""
     return False
+
+
+@kernel
+def needs_balance(model, j):
+    """Whether response j needs more than the state: accelerations, multipliers, sums of forces."""
+    if model.response[j, KIND] == EXPRESSION:
+        return knows(model, j, BALANCED)
+    return _needs_accelerations(model.response[j, KIND])
 
 
 @chosen(LISTED, lambda each: True if each.by_state else None, part)
 def _is_by_state(kind):
     """Whether the rate of responses of a kind is g_q v + g_v a (`ResponseKernels.by_state`)."""
     return False
-
-
-@kernel
-def rate_is_by_state(model, j):
-    """Whether the rate of response j is g_q v + g_v a (`ResponseKernels.by_state`)."""
-    return _is_by_state(model.response[j, 0])
 
 
 @kernel
@@ -152,12 +172,15 @@ def follows_state(tag, model, j):
     kind = model.response[j, KIND]
     if kind == MEMBER_FORCE:
         return derivatives(tag) > 1 and is_plain(model, model.response[j, SUBJECT])
-    return _is_by_state(kind) and model.response[j, ORDER] < derivatives(tag)
+    by_state = knows(model, j, BY_STATE) if kind == EXPRESSION else _is_by_state(kind)
+    return by_state and model.response[j, ORDER] < derivatives(tag)
 
 
 @kernel
 def kinked(model, j):
     """Whether response j is a norm, an absolute value, or a largest one, which may have kinks in time."""
+    if model.response[j, KIND] == EXPRESSION:
+        return knows(model, j, ROOT)
     return _is_absolute(model.response[j, KIND]) or is_norm(model, j)
 
 
@@ -424,6 +447,164 @@ def _value(kind, model, member_state, segment, j, who, t, q, v, a, lam, workspac
 
 
 @kernel
+def _parts_of_expression(model, member_state, segment, j, t, q, v, a, lam, workspace, p, bars, rows):
+    """Values and slopes of the responses that expression j is of, at a state whose balance has just been made.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      j: the expression.
+      t: time (s).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+      lam (n_row,): multipliers of the joints.
+      workspace: workspace as the balance of this state has left it.
+    Out:
+      p (numbers_of,): the values, and behind them the parameters of the expression.
+      bars (PARTS, 3, n), rows (PARTS, n_row): slopes of each by q, v, a and by lam; zeros before.
+    """
+    first = model.response[j, FIRST_PART]
+    for m in range(model.response[j, PARTS]):
+        c = first + m
+        p[m] = _value(
+            model.response[c, KIND], model, member_state, segment, c, -1, t, q, v, a, lam, workspace, bars[m], rows[m]
+        )
+    put_parameters(model, j, p)
+
+
+@kernel
+def _expression_value(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar):
+    """Value of expression j, by the chain rule with its slopes.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      j, who: the expression, and on which side its switches are (`expressions`).
+      t: time (s).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+      lam (n_row,): multipliers of the joints.
+      workspace: workspace as the balance of this state has left it.
+    Out:
+      bars (3, n), row_bar (n_row,): slopes by q, v, a and by lam, zero before.
+    """
+    count = model.response[j, PARTS]
+    p = np.empty(numbers_of(model, j))
+    of_parts = np.zeros((count, 3, v.shape[0]))
+    rows = np.zeros((count, row_bar.shape[0]))
+    slopes = np.empty(count)
+    _parts_of_expression(model, member_state, segment, j, t, q, v, a, lam, workspace, p, of_parts, rows)
+    value, _ = formula_value(model, j, who, p, t, slopes)
+    for m in range(count):
+        if slopes[m] == 0.0:
+            continue
+        for i in range(3):
+            for d in range(v.shape[0]):
+                bars[i, d] += slopes[m] * of_parts[m, i, d]
+        for r in range(row_bar.shape[0]):
+            row_bar[r] += slopes[m] * rows[m, r]
+    return value
+
+
+@kernel
+def _expression_numbers(model, member_state, segment, j, t, q, v, a, lam, workspace):
+    """Values of what expression j is of, and its parameters (numbers_of,).
+
+    model: the compiled scene.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    segment: number of the stretch of time between two breakpoints.
+    j: the expression.
+    t: time (s).
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    lam (n_row,): multipliers of the joints.
+    workspace: workspace as the balance of this state has left it.
+    """
+    count = model.response[j, PARTS]
+    p = np.empty(numbers_of(model, j))
+    bars = np.zeros((count, 3, v.shape[0]))
+    rows = np.zeros((count, lam.shape[0]))
+    _parts_of_expression(model, member_state, segment, j, t, q, v, a, lam, workspace, p, bars, rows)
+    return p
+
+
+@kernel
+def chosen_part(model, member_state, segment, j, who, t, q, v, a, lam, workspace):
+    """Of which member the force is meant, or on which side the switches of an expression are.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      j: the response.
+      who: what is asked for; -1: the member with the largest force, and the sides of this state; below -1, of an
+        expression: the margin of a switch there (`expressions`).
+      t: time (s).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+      lam (n_row,): multipliers of the joints.
+      workspace: workspace as the balance of this state has left it.
+    """
+    if who >= 0:
+        return who
+    if model.response[j, KIND] == MEMBER_FORCE:
+        return np.int64(largest_force(model, member_state, segment, t, model.response[j, SUBJECT], q, v, a))
+    if has_switches(model, j):
+        p = _expression_numbers(model, member_state, segment, j, t, q, v, a, lam, workspace)
+        return formula_mode(model, j, p, t) + (-1 - who) * MARGINS
+    return np.int64(who)
+
+
+@kernel
+def is_chosen(model, j):
+    """Whether response j is one of several, by `chosen_part`."""
+    return model.response[j, KIND] == MEMBER_FORCE or has_switches(model, j)
+
+
+@kernel
+def has_switches(model, j):
+    """Whether response j is an expression with kinks or jumps."""
+    return model.response[j, KIND] == EXPRESSION and model.response[j, SWITCHES] > 0
+
+
+@kernel
+def has_energy(model, j):
+    """Whether response j is the stored energy, or an expression that has it."""
+    kind = model.response[j, KIND]
+    return kind == ENERGY or (kind == EXPRESSION and knows(model, j, ENERGETIC))
+
+
+@kernel
+def energy_weight(model, member_state, segment, j, who, t, q, v, a, lam, workspace):
+    """The slope of response j by the stored energy, which depends on the design at fixed motion.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      j, who: the response, and of an expression on which side its switches are.
+      t: time (s).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+      lam (n_row,): multipliers of the joints.
+      workspace: workspace as the balance of this state has left it.
+    """
+    if not has_energy(model, j):
+        return 0.0
+    if model.response[j, KIND] == ENERGY:
+        return 1.0
+    p = _expression_numbers(model, member_state, segment, j, t, q, v, a, lam, workspace)
+    slopes = np.empty(model.response[j, PARTS])
+    formula_value(model, j, who, p, t, slopes)
+    weight = 0.0
+    for m in range(slopes.shape[0]):
+        if model.response[model.response[j, FIRST_PART] + m, KIND] == ENERGY:
+            weight += slopes[m]
+    return weight
+
+
+@kernel
 def response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar):
     """Value of response j, with its slopes, at a state whose balance has just been made.
 
@@ -444,6 +625,8 @@ def response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, b
     """
     bars[:] = 0.0
     row_bar[:] = 0.0
+    if model.response[j, KIND] == EXPRESSION:
+        return _expression_value(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
     return _value(
         model.response[j, KIND], model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar
     )
@@ -623,12 +806,31 @@ def is_norm(model, j):
 
 def has_norm(model: GeneralModel, j: int) -> bool:
     """`is_norm` in Python."""
+    if is_expression(model, j):
+        return False
     return LISTED[int(model.response[j, KIND])].vector is not None and int(model.response[j, COMPONENT]) == NORM
 
 
 def has_kinks(model: GeneralModel, j: int) -> bool:
     """`kinked` in Python."""
-    return LISTED[int(model.response[j, KIND])].absolute or has_norm(model, j)
+    return is_absolute(model, j) or has_norm(model, j)
+
+
+def is_absolute(model: GeneralModel, j: int) -> bool:
+    """Whether response j is an absolute value, or the largest of several, or an expression that is a root."""
+    if is_expression(model, j):
+        return bool(model.response[j, KNOWN] & ROOT)
+    return LISTED[int(model.response[j, KIND])].absolute
+
+
+def is_expression(model: GeneralModel, j: int) -> bool:
+    """Whether response j is an expression of others."""
+    return int(model.response[j, KIND]) == EXPRESSION
+
+
+def switches_of(model: GeneralModel, j: int) -> int:
+    """How many kinks and jumps response j has as an expression."""
+    return int(model.response[j, SWITCHES]) if is_expression(model, j) else 0
 
 
 @_chosen_of_bodies(lambda each: each.vector and each.vector.across)
@@ -854,9 +1056,7 @@ def value_at(model, member_state, segment, t, q, v, j, workspace):
     bars = np.empty((3, n))
     row_bar = np.empty(model.size[0])
     solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
-    who = -1
-    if model.response[j, KIND] == MEMBER_FORCE:
-        who = largest_force(model, member_state, segment, t, model.response[j, SUBJECT], q, v, a)
+    who = chosen_part(model, member_state, segment, j, np.int64(-1), t, q, v, a, lam, workspace)
     return response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
 
 
@@ -899,10 +1099,9 @@ def rated(
     if j < 0:
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
         return np.nan, np.nan, 1
-    kind = model.response[j, KIND]
     order = model.response[j, ORDER]
     simple = not rates or follows_state(tag, model, j)
-    by_itself = not needs_accelerations(kind) and (order == 0 or (order == 1 and not rates))
+    by_itself = not needs_balance(model, j) and (order == 0 or (order == 1 and not rates))
     made = 0
     if balanced or not simple or not by_itself:
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
@@ -914,11 +1113,14 @@ def rated(
     if simple:
         for d in range(n):
             rate += bars[0, d] * v[d]
-        if order > 0 or needs_accelerations(kind):
+        if order > 0 or needs_balance(model, j):
             for d in range(n):
                 rate += bars[1, d] * a[d]
-        if kind == MEMBER_FORCE:
+        if model.response[j, KIND] == MEMBER_FORCE:
             rate += force_by_time(model, member_state, segment, t, model.response[j, SUBJECT], who, q, v)
+        if model.response[j, KIND] == EXPRESSION and knows(model, j, TIMED):
+            p = _expression_numbers(model, member_state, segment, j, t, q, v, a, lam, workspace)
+            rate += formula_value(model, j, who, p, t, np.empty(model.response[j, PARTS]))[1]
         return value, rate, made
     apart = APART * (history.t[k + 1] - history.t[k])
     sides = np.zeros(2)
@@ -971,6 +1173,6 @@ def code_of(kind: ResponseKind) -> int:
 
 
 for _kind in (*RESPONSES.values(), *SPATIAL_RESPONSES.values()):
-    if _kind.kernels.startswith("mdstopo."):
+    if _kind.kernels.startswith("mdstopo."):  # an expression has none
         code_of(_kind)
 LISTED.is_filled = True

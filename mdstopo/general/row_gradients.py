@@ -46,11 +46,12 @@ class RowGradients:
             for share, part in parts(driver.rows[j, r])
             for aside in range(1 if across is None or driver.shapes[j] != "norm" else 2)
         ]
+        wanted += [(j, 0, 0, factor, row) for j, rows in driver.jumps.items() for factor, row in rows]
         wanted.sort(key=lambda row: (-row[4].item(STEP), -row[4].item(FRACTION)))  # the latest first
         for j, reduction in enumerate(driver.scene.reductions):
             if reduction not in INTEGRALS:
                 driver.gradients[j, : driver.found[j]] = 0.0
-        most = max(1, BLOCK // len(driver.padded))
+        most = max(1, BLOCK // max(1, len(driver.padded)))
         for first in range(0, len(wanted), most):
             part = wanted[first : first + most]
             block = self._block(len(part))

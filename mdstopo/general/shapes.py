@@ -1,9 +1,9 @@
 """How the value of a response comes from what it is formed of: as it is, as an absolute value, or as a norm."""
 
 from mdstopo.evaluation import Shape
-from mdstopo.general.model import KIND, GeneralModel
+from mdstopo.general.model import GeneralModel
 from mdstopo.general.quadrature_breakpoints import INTEGRALS
-from mdstopo.general.responses import LISTED, has_norm
+from mdstopo.general.responses import has_norm, is_absolute
 
 
 def shape_of(model: GeneralModel, j: int, reduction: str) -> Shape:
@@ -12,4 +12,4 @@ def shape_of(model: GeneralModel, j: int, reduction: str) -> Shape:
         return "plain"
     if has_norm(model, j):
         return "norm"
-    return "absolute" if reduction == "max_abs" or LISTED[int(model.response[j, KIND])].absolute else "plain"
+    return "absolute" if reduction == "max_abs" or is_absolute(model, j) else "plain"

@@ -4,14 +4,17 @@ Arrays have points and axes of a body in its principal axes: there the masses ar
 R_home = R P, with the body's own axes R and the principal ones P among them (`scene.quaternions.principal`).
 """
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import GROUND, Case, Joint, Load, LoadCase, Response, Signal
 from mdstopo.compiler.kernel import Kernel
 from mdstopo.general.contact_compile import surface_rows
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
+from mdstopo.general.timed_loads import TimedPart
 from mdstopo.mechanics.joints.kernels import FITTED
 from mdstopo.mechanics.kinematics import spatial_bushings
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
@@ -41,6 +44,7 @@ from mdstopo.mechanics.kinematics.spatial_joints import (
 from mdstopo.mechanics.kinematics.spatial_joints import APART as APART_FIRST
 from mdstopo.mechanics.kinematics.spatial_joints import AT as MEETS
 from mdstopo.mechanics.kinematics.spatial_poses import HOME, HOME_AXES, HOME_PLACE, HOME_TURN
+from mdstopo.mechanics.kinematics.timed import MOMENT, PUSH
 from mdstopo.scene.loads import Loads
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.quaternions import principal
@@ -159,6 +163,21 @@ def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames
     )
 
 
+def _timed(load: Load, frames: Frames) -> Iterator[TimedPart]:
+    """Components of force, moment and angular acceleration that are formulas of time."""
+    arm = tuple(in_frame(frames, load.body, np.array(load.at_local, dtype=np.float64)).tolist())
+    axes = in_frame(frames, load.body, np.eye(3)) if load.frame == "body" else np.eye(3)
+    follows = FOLLOWS if load.frame == "body" else GLOBAL
+    for given, kind, how in (
+        (load.force, PUSH, follows),
+        (load.moment, MOMENT, follows),
+        (load.angular_acceleration, MOMENT, ACCELERATES),
+    ):
+        for signal, direction in zip(given if isinstance(given, tuple) else (), axes.tolist(), strict=False):
+            if isinstance(signal, TimeFormula):
+                yield TimedPart(signal, kind, how, tuple(direction), arm)
+
+
 def _bushings(case: Case, index: dict[str, int], pairs: Pairs, home: FloatArray) -> tuple[IndexArray, FloatArray]:
     """The pair (n_bushing,) and the parameters (n_bushing, WIDTH) of each bushing (`spatial_bushings`)."""
     where = np.zeros(len(case.bushings), dtype=np.int64)
@@ -243,6 +262,7 @@ SPACE = Dimension(
     stated=_stated,
     places=_places,
     loads=_loads,
+    timed=_timed,
     bushings=_bushings,
     half_turn=half_turn,
     contacts=surface_rows,

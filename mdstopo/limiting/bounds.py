@@ -16,6 +16,7 @@ from mdstopo.limiting.response import Limits, NoBoundError, limits_of, objective
 from mdstopo.limiting.solve import UnsolvedError
 from mdstopo.limiting.system import System
 from mdstopo.scene.bodies import is_spatial
+from mdstopo.scene.signals import formulas_of
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ def bound(case: Case, objective: Objective) -> Bound:
             None, "ends of members are design variables: bounds are known of ends that stay in their body alone"
         )
     load_case = case.load_case(objective.load_case)
+    if formulas_of(load_case):
+        return Bound(None, "bounds are known of constant and tabulated loads and motions, of formulas of time not")
     try:
         if case.solver.assemble and case.joints:
             raise NoBoundError("solver.assemble moves the start to where joints fit: state a start that fits")

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.arrays import Signal, TimeFormula
 from mdstopo.case.laws.law import Ranges
 from mdstopo.case.model import (
     Case,
@@ -435,5 +436,6 @@ def _turn(system: System, name: str, t: Floats) -> Floats:
     return np.asarray(abs(body.angular_velocity) * past + 0.5 * moment / body.inertia * past**2)
 
 
-def _size(signal: float | Table) -> float:
+def _size(signal: Signal) -> float:
+    assert not isinstance(signal, TimeFormula), "of loads that are formulas of time no bound is known"
     return float(np.abs(signal.values).max()) if isinstance(signal, Table) else abs(signal)

@@ -22,6 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mdstopo.case.arrays import Signal
 from mdstopo.case.model import (
     GROUND,
     Case,
@@ -230,7 +231,7 @@ def turned(vector: tuple[float, float], angle: float) -> Floats:
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 
 
-def _acts(signal: float | Table) -> bool:
+def _acts(signal: Signal) -> bool:
     return bool(np.any(signal.values)) if isinstance(signal, Table) else signal != 0.0
 
 

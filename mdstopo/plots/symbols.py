@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.arrays import Table
+from mdstopo.case.arrays import Table, TimeFormula
 from mdstopo.case.model import GROUND, Case, Load, LoadCase
 from mdstopo.plots.scenery import Floats
 from mdstopo.scene.points import points_at
 
 #: of the largest: what is smaller has no arrow
 TINY = 1e-6
+#: times at which a load that is a formula is looked at for its largest value
+SAMPLES = 201
 #: kinds that change with time
 LOADS = ("load", "moment")
 
@@ -67,14 +69,16 @@ def _motions(case: Case, chosen: LoadCase) -> Iterator[Symbol]:
 
 
 def _loads(case: Case, chosen: LoadCase, time: float | None) -> Iterator[Symbol]:
-    d = case.dimension
+    d, span = case.dimension, (chosen.start, chosen.end)
     found: list[tuple[str, Load, Floats]] = []
     for load in chosen.loads:
-        found.append(("load", load, _shown(load.force, time)))
+        found.append(("load", load, _shown(load.force, time, span)))
         turning = load.angular_acceleration if load.angular_acceleration is not None else load.moment
-        found.append(("moment", load, _shown(turning if isinstance(turning, tuple) else (turning,), time)))
+        found.append(("moment", load, _shown(turning if isinstance(turning, tuple) else (turning,), time, span)))
     largest = {
-        kind: max((float(np.linalg.norm(_shown(_signals(each, kind), None))) for _, each, _ in found), default=0.0)
+        kind: max(
+            (float(np.linalg.norm(_shown(_signals(each, kind), None, span))) for _, each, _ in found), default=0.0
+        )
         for kind in ("load", "moment")
     }
     for kind, load, value in found:
@@ -94,16 +98,20 @@ def _signals(load: Load, kind: str) -> tuple[Any, ...]:
     return turning if isinstance(turning, tuple) else (turning,)
 
 
-def _shown(signals: tuple[Any, ...], time: float | None) -> Floats:
-    """The vector at a time; without one, where its norm is largest."""
+def _shown(signals: tuple[Any, ...], time: float | None, span: tuple[float, float]) -> Floats:
+    """The vector at a time; without one, where its norm is largest between two times."""
     if time is not None:
         return np.array([_value(each, time) for each in signals])
     times = np.unique(np.concatenate([[0.0], *(each.times for each in signals if isinstance(each, Table))]))
+    if any(isinstance(each, TimeFormula) for each in signals):
+        times = np.union1d(times, np.linspace(*span, SAMPLES))
     values = np.array([[_value(each, t) for each in signals] for t in times.tolist()])
     return np.asarray(values[int(np.linalg.norm(values, axis=1).argmax())])
 
 
 def _value(signal: Any, time: float) -> float:
+    if isinstance(signal, TimeFormula):
+        return signal.at(time)
     if isinstance(signal, Table):
         return float(np.interp(time, signal.times, signal.values[:, 0]))
     return float(signal)

@@ -75,4 +75,5 @@ def _limited(row: VolumeRow | ResponseRow) -> tuple[object, ...]:
 def _seen(response: Response) -> tuple[object, ...]:
     """A response but for where on its body it is looked at."""
     of = response
-    return of.kind, of.body, of.relative_to, of.component, of.group, of.joint, of.since
+    parts = tuple((name, _seen(each)) for name, each in of.of)
+    return of.kind, of.body, of.relative_to, of.component, of.group, of.joint, of.since, of.formula, parts

@@ -3,6 +3,7 @@
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
 from mdstopo.case.responses import kind_of
+from mdstopo.scene.signals import formulas_of
 
 #: reductions of stored energy that the first family computes
 _REDUCTIONS = frozenset({"max", "min", "mean", "integral", "final"})
@@ -25,6 +26,8 @@ def beyond_springs(case: Case) -> str:
         return "bushings"
     if any(load_case.motions for load_case in case.load_cases):
         return "prescribed motions"
+    if any(formulas_of(load_case) for load_case in case.load_cases):
+        return "loads that are formulas of time"
     if case.variables:
         return "movable points" if all(each.points for each in case.variables) else "design variables of laws"
     for group in case.members:

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import (
     GROUND,
     AnyContact,
@@ -29,6 +30,7 @@ from mdstopo.case.model import (
     Motion,
     Objective,
     Prescribed,
+    Response,
     ResponseRow,
     SurfaceContact,
     Table,
@@ -185,10 +187,15 @@ def _contact(contact: AnyContact, origin: Point) -> AnyContact:
 
 def _looked(row: _Row, origin: Point) -> _Row:
     """An objective or constraint; a point on ground that is looked at, from `origin`."""
-    seen = row.response
+    return replace(row, response=_seen(row.response, origin))
+
+
+def _seen(seen: Response, origin: Point) -> Response:
+    if seen.of:
+        return replace(seen, of=tuple((name, _seen(each, origin)) for name, each in seen.of))
     if seen.body != GROUND or seen.at_local is None:
-        return row
-    return replace(row, response=replace(seen, at_local=_from(seen.at_local, origin)))
+        return seen
+    return replace(seen, at_local=_from(seen.at_local, origin))
 
 
 def _load_case(load_case: LoadCase, origin: Point) -> LoadCase:
@@ -206,5 +213,7 @@ def _motion(motion: Motion, origin: Point) -> Motion:
 def _along(part: Prescribed | None, along: float) -> Prescribed | None:
     if part is None or part.kind != "position":
         return part
+    if isinstance(part.signal, TimeFormula):
+        return Prescribed("position", part.signal.shifted(-along))
     assert isinstance(part.signal, Table)
     return Prescribed("position", Table(part.signal.times, part.signal.values - along))

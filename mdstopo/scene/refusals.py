@@ -58,10 +58,13 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
         yield "solver.sensitivity", no_derivatives(case, solver.sensitivity)[1]
     for group in case.priced_groups:
         yield from _unpriced(case, group)
-    if not solver.settle:
-        for path, response in _looked_at(case):
-            if response.since == "settled":
-                yield f"{path}.response.{response.kind}.since", "settled needs `solver: {settle: true}`"
+    for path, response in _looked_at(case):
+        if response.since == "settled" and not solver.settle:
+            yield f"{path}.response.{response.kind}.since", "settled needs `solver: {settle: true}`"
+        for name, part in response.of:
+            if part.since == "settled":
+                key = f"{path}.response.expression.of.{name}.{part.kind}.since"
+                yield key, "within an expression displacements count from where the case has them: stated"
 
 
 def _looked_at(case: Case) -> Iterator[tuple[str, Response]]:

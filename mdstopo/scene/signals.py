@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import Load, LoadCase, Signal, Table
 from mdstopo.scene.model import FloatArray
 
@@ -36,14 +37,35 @@ def signals_of(load: Load) -> Iterator[Signal]:
             yield several
 
 
+def motion_signals(load_case: LoadCase) -> Iterator[Signal]:
+    """All signals of prescribed motions."""
+    for motion in load_case.motions:
+        for part in (motion.x, motion.y, motion.z, motion.angle):
+            if part is not None:
+                yield part.signal
+        if motion.rotation is not None:
+            yield from motion.rotation.signals
+
+
+def formulas_of(load_case: LoadCase) -> list[TimeFormula]:
+    """The loads and the motions that are formulas of time."""
+    signals = [signal for load in load_case.loads for signal in signals_of(load)]
+    return [signal for signal in (*signals, *motion_signals(load_case)) if isinstance(signal, TimeFormula)]
+
+
 def _nearness(start: float, end: float) -> float:
     """Times nearer to each other than this are the same, s."""
     return 1e-12 * (end - start) + 4e-15 * max(abs(start), abs(end))
 
 
 def segment_values(signal: Signal, times: FloatArray) -> FloatArray:
-    """(n_segments, 2): the signal's value just after each segment's start, and its slope within the segment."""
+    """(n_segments, 2): the signal's value just after each segment's start, and its slope within the segment.
+
+    Of a formula zeros, for kernels call it.
+    """
     out = np.zeros((len(times) - 1, 2))
+    if isinstance(signal, TimeFormula):
+        return out
     if not isinstance(signal, Table):
         out[:, 0] = signal
         return out

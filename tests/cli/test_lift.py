@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mdstopo
-from mdstopo.case.arrays import Table
+from mdstopo.case.arrays import Signal, Table, TimeFormula
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case, read_case
@@ -58,6 +58,7 @@ loads:
   - {body: b, acceleration: [9.8, 0], angular_acceleration: 20}
   - {body: a, force: {table: [[0, 1, 2], [0.1, 3, 4]]}, moment: {table: [[0, 1], [1, 2]]}, frame: body, at: [1, 0]}
   - {body: b, force: [{table: [[0, 1], [0.1, 1], [0.1, 5]]}, 3], moment: [[0, 1], [1, 2]]}
+  - {body: b, force: ["10*t", {formula: "a*t + 1", parameters: {a: 3}}], angular_acceleration: "2*t"}
 load_cases:
   one: {loads: [{body: b, angular_acceleration: 20}], gravity: [1, 0]}
   two: {time: {end: 0.1}}
@@ -68,7 +69,10 @@ objectives:
   G4: {response: {angular_velocity: {body: a}}, load_case: one, over_time: max_abs}
   G5: {response: {joint_force: {joint: hip}}, load_case: one}
   G6: {response: {velocity: {body: a, relative_to: b, component: x}}, load_case: one}
-combine: {weights: {G1: 1, G2: 1, G3: 1, G4: 1, G5: 1, G6: 1}}
+  G7:
+    response: {expression: {formula: "u + w^2", of: {u: energy, w: {angular_velocity: {body: a, relative_to: b}}}}}
+    load_case: one
+combine: {weights: {G1: 1, G2: 1, G3: 1, G4: 1, G5: 1, G6: 1, G7: 1}}
 constraints:
   - {volume: all, fraction: 0.1}
   - {response: {member_force: {group: belts}}, load_case: two, limit: 5}
@@ -115,8 +119,10 @@ def flat(body: str, plane: np.ndarray) -> np.ndarray:
     return plane[:2, :2].T if body == "ground" else np.eye(2)
 
 
-def at(signal: float | Table, time: float) -> float:
+def at(signal: Signal, time: float) -> float:
     """A signal at a time, right-continuous."""
+    if isinstance(signal, TimeFormula):
+        return signal.at(time)
     if not isinstance(signal, Table):
         return signal
     t, x = signal.times, signal.values[:, 0]
@@ -137,6 +143,10 @@ def test_the_case_in_space_is_the_same_scene(spot: tuple[tuple[float, float, flo
     assert (responses["G3"].kind, responses["G3"].component) == ("rotation", "z")
     assert responses["G4"].component == ("norm" if spot[1] else "z")
     assert responses["G6"].component == "x"
+    assert [(name, each.kind, each.component) for name, each in responses["G7"].of] == [
+        ("u", "energy", None),
+        ("w", "angular_velocity", "z"),
+    ]
     assert spatial.constraints[0] == planar.constraints[0]
     assert spatial.joints[0].axes_first[0] @ spatial.bodies[0].rotation.T == pytest.approx(about_axis(*spot)[:, 2])
 
@@ -220,6 +230,7 @@ TABLE = "[[0, 0.5], [0.1, 0.9], [0.2, 0.4], [0.3, 0]]"
         ("angle: 0.5, angular_velocity: 3", "velocity: {table: [[0, 3], [0.1, 5]]}"),
         ("angle: 0.5, angular_velocity: 3", "acceleration: 7"),
         ("velocity: [0, 0]", f"position: {{table: {TABLE}}}"),
+        ("velocity: [0, 0]", "position: '0.5 + 4*t^2'"),
     ],
 )
 def test_a_driven_angle_turns_about_the_normal(

@@ -123,6 +123,18 @@ def test_derivatives_are_those_of_differences(linked: FitProblem) -> None:
     check(linked, x)
 
 
+def test_numbers_of_loads_that_are_formulas_are_fitted_by_differences() -> None:
+    load = '- {body: arm, moment: {formula: "a*sin(w*t)", parameters: {a: 0.5, w: 20}}}'
+    keys = "loads[1].moment.parameters.w: {lower: 10, upper: 30}"
+    text = LINKED.replace("members:\n", f"  {load}\nmembers:\n", 1)
+    text = text.replace("  measured:", f"    {keys}\n  measured:", 1)
+    problem = problem_of(text, {"lift": TIMES, "blow": TIMES[1:] + 0.001, "pin": TIMES[1:]})
+    by_name = dict(zip(problem.names, problem.derivatives, strict=True))
+    assert by_name["loads[1].moment.parameters.w"] == "differences"
+    assert by_name["loads[0].force[0]"] == "exact"
+    check(problem, problem.initial)
+
+
 def test_so_are_those_of_members_that_keep_a_permanent_set() -> None:
     t = np.linspace(0.02, 0.39, 12)
     crushed = problem_of(CRUSHED, {"lift": t, "speed": t})

@@ -433,7 +433,7 @@ def test_rounding_is_not_halved_on_and_on():
     rng = np.random.default_rng(0)
     nodes, weights = np.polynomial.legendre.leggauss(5)
     t = np.linspace(0.0, 1.0, 11)
-    found = halves(t, t, lambda places: rng.normal(size=len(places)), np.stack([nodes + 1, weights]) / 2, 1e-9)
+    found = halves(t, t, lambda places, _: rng.normal(size=len(places)), np.stack([nodes + 1, weights]) / 2, 1e-9)
     assert len(found) < 1000
 
 

@@ -69,7 +69,8 @@ def scene(seed: int = 3, members: int = 4) -> Any:
         home=home, pair=pair, reach=np.ones(2), member=member, mass=random.uniform(1.0, 3.0, N), curves=np.zeros(1),
         times=np.array([0.0, 1.0]), force=random.normal(size=(1, N, 2)), load_body=np.array([0, 1, 0]),
         load_follows=np.array([0, 1, 2]), load_arm=random.normal(size=(3, 3)),
-        load_force=random.normal(size=(1, 3, 6, 2)), driven=np.zeros(0, dtype=np.int64),
+        load_force=random.normal(size=(1, 3, 6, 2)), timed_load=np.zeros((0, 3), dtype=np.int64),
+        driven=np.zeros(0, dtype=np.int64),
         joint=np.array([[code, 0, 1, 0, 0] for code in range(8)]), joint_par=joint_par,
         bushing_pair=np.array([0]), bushing=np.abs(random.normal(size=(1, BUSHING))),
     )  # fmt: skip

@@ -6,9 +6,10 @@ import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from mdstopo.case.formula_keys import FormulaText
 from mdstopo.case.kinds import NUMBER, Schema
 from mdstopo.case.laws.law import Law, free_length_key
-from mdstopo.case.nodes import MAPPING, SCALAR, Node
+from mdstopo.case.nodes import MAPPING, Node
 from mdstopo.case.reading import BAD, Fields, Reading, found
 from mdstopo.case.value import Value, frozen, stated
 from mdstopo.case.words import inside, shown
@@ -23,39 +24,6 @@ if TYPE_CHECKING:
 MOTION = ("x", "xd", "t", "l", "l0")
 MOST_PARAMETERS = 7
 _FORMULAS = ("force", "energy", "damping")
-
-
-@frozen
-class FormulaText(Value):
-    """A formula. without: names of a motion that it may not use, with the reason."""
-
-    without: tuple[str, ...] = ()
-    why: str = ""
-
-    def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD; whether names are known is checked where the law's parameters are."""
-        value = node.scalar() if node.kind == SCALAR else None
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
-            value = node.text
-        if not isinstance(value, str):
-            reading.mistake(path, f"found {found(node)}, allowed is an expression", node)
-            return BAD
-        try:
-            formula = parse(value)
-        except FormulaError as error:
-            reading.mistake(path, str(error), node)
-            return BAD
-        for part, column in formula.columns.items():
-            if part.word in self.without:
-                why = f"{part.word!r} is not allowed here: {self.why} (column {column} of the expression)"
-                reading.mistake(path, why, node)
-                return BAD
-        reading.mark(path, node)
-        return value
-
-    def schema(self) -> Schema:
-        """string, or a number, which is a formula too."""
-        return {"type": ["string", "number"]}
 
 
 @frozen
@@ -158,19 +126,9 @@ class OfFormulas(Law):
     @property
     def too_large(self) -> str:
         """Why the formulas are too large to be used; nothing where they are not."""
-        from mdstopo.formula.law_formulas import MOST_OPERATIONS
-        from mdstopo.formula.modes import MOST_SWITCHES, TooManySwitchesError
+        from mdstopo.formula.law_formulas import why_too_large  # most cases have no formulas
 
-        try:
-            operations = self.program.operations
-        except TooManySwitchesError:
-            which = "abs, min, max, clip, sign, step, if"
-            return f"found more kinks and jumps ({which}) than allowed, which are {MOST_SWITCHES}"
-        if operations <= MOST_OPERATIONS:
-            return ""
-        return (
-            f"found {operations} operations in the formulas with all derivatives, allowed are {MOST_OPERATIONS} at most"
-        )
+        return why_too_large(lambda: self.program.groups)
 
     @property
     def depends_on_rate(self) -> bool:

@@ -34,6 +34,7 @@ from mdstopo.mechanics.kinematics import (
 )
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.kinematics.planar_forces import add_loads as add_applied_loads
+from mdstopo.mechanics.kinematics.planar_forces import add_timed_loads, add_timed_tangent
 from mdstopo.mechanics.kinematics.planar_forces import load_tangent as tangent_of_loads
 from mdstopo.mechanics.kinematics.planar_forces import pair_tangent as tangent_of_pair
 from mdstopo.mechanics.kinematics.planar_poses import (
@@ -62,11 +63,14 @@ from mdstopo.mechanics.kinematics.planar_scales import (
     add_gross_force as add_gross,
 )
 from mdstopo.mechanics.kinematics.planar_scales import (
+    add_gross_timed_loads,
+    rounding_of_pairs,
+)
+from mdstopo.mechanics.kinematics.planar_scales import (
     deflection as deflection_of_pair,
 )
 from mdstopo.mechanics.kinematics.planar_scales import (
-    gross_loads,
-    rounding_of_pairs,
+    gross_loads as gross_steady_loads,
 )
 from mdstopo.mechanics.kinematics.planar_scales import (
     largest_turn as turn_of_pairs,
@@ -262,12 +266,24 @@ def turning_rate(model, rel, p):
 def add_loads(model, segment, t, q, v, f):
     """See `planar_forces`: inertia in a plane has no forces of its own; see `kinematics_interface.add_loads`."""
     add_applied_loads(model, segment, t, q, f)
+    if model.timed_load.shape[0] > 0:
+        add_timed_loads(model, segment, t, q, f)
 
 
 @part
 def load_tangent(model, segment, t, q, v, turn):
     """See `planar_forces`: each body has one angle; see `kinematics_interface.load_tangent`."""
     tangent_of_loads(model, segment, t, q, turn.reshape(turn.size))
+    if model.timed_load.shape[0] > 0:
+        add_timed_tangent(model, segment, t, q, turn.reshape(turn.size))
+
+
+@part
+def gross_loads(model, out):
+    """See `planar_scales`."""
+    gross_steady_loads(model, out)
+    if model.timed_load.shape[0] > 0:
+        add_gross_timed_loads(model, out)
 
 
 @part

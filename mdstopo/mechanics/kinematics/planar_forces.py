@@ -2,6 +2,7 @@
 
 from mdstopo.compiler.jit import inline, kernel, part
 from mdstopo.mechanics.kinematics.planar_poses import COS_A, DX, DY, OMEGA_A, SIN_A, VX, VY, turned_body
+from mdstopo.mechanics.kinematics.timed import ARM, BODY, DIRECTION, KIND, MOMENT, TURNS, timed_load_size
 
 
 @part
@@ -14,17 +15,45 @@ def add_loads(model, segment, t, q, f):
     if model.load_body.shape[0] == 0:
         return
     for k in range(model.load_body.shape[0]):
-        b = 3 * model.load_body[k]
-        c, s, _, _ = turned_body(model.home, model.load_body[k], q[b + 2])
         x = model.load_force[segment, k, 0, 0] + tau * model.load_force[segment, k, 0, 1]
         y = model.load_force[segment, k, 1, 0] + tau * model.load_force[segment, k, 1, 1]
-        if model.load_follows[k]:
-            x, y = c * x - s * y, s * x + c * y
-        rx = c * model.load_arm[k, 0] - s * model.load_arm[k, 1]
-        ry = s * model.load_arm[k, 0] + c * model.load_arm[k, 1]
-        f[b] += x
-        f[b + 1] += y
-        f[b + 2] += rx * y - ry * x
+        _push(model, model.load_body[k], model.load_follows[k], model.load_arm[k, 0], model.load_arm[k, 1], x, y, q, f)
+
+
+@inline
+def _push(model, body, follows, arm_x, arm_y, x, y, q, f):
+    """Add a force at a point of a body.
+
+    model: the compiled scene.
+    body: which. follows: whether the force turns with it.
+    arm_x, arm_y: the point, in the body's frame (m).
+    x, y: the force (N).
+    q (n,): coordinates (m, rad).
+    f (n,): in and out.
+    """
+    b = 3 * body
+    c, s, _, _ = turned_body(model.home, body, q[b + 2])
+    if follows:
+        x, y = c * x - s * y, s * x + c * y
+    rx = c * arm_x - s * arm_y
+    ry = s * arm_x + c * arm_y
+    f[b] += x
+    f[b + 1] += y
+    f[b + 2] += rx * y - ry * x
+
+
+@kernel
+def add_timed_loads(model, segment, t, q, f):
+    """f (n or more,) += the loads that are formulas of time, of a general scene (`GeneralModel.timed_load`)."""
+    for k in range(model.timed_load.shape[0]):
+        size = timed_load_size(model, segment, k, t)
+        body = model.timed_load[k, BODY]
+        if model.timed_load[k, KIND] == MOMENT:
+            f[3 * body + 2] += size
+            continue
+        arm = model.timed_arm[k]
+        x, y = size * arm[DIRECTION], size * arm[DIRECTION + 1]
+        _push(model, body, model.timed_load[k, TURNS], arm[ARM], arm[ARM + 1], x, y, q, f)
 
 
 @kernel
@@ -33,17 +62,45 @@ def load_tangent(model, segment, t, q, turn):
     turn[:] = 0.0
     tau = t - model.times[segment]
     for k in range(model.load_body.shape[0]):
-        b = 3 * model.load_body[k]
-        c, s, _, _ = turned_body(model.home, model.load_body[k], q[b + 2])
         x = model.load_force[segment, k, 0, 0] + tau * model.load_force[segment, k, 0, 1]
         y = model.load_force[segment, k, 1, 0] + tau * model.load_force[segment, k, 1, 1]
-        if model.load_follows[k]:  # force and arm turn together: the moment stays
-            turn[b] -= s * x + c * y
-            turn[b + 1] += c * x - s * y
-        else:
-            rx = c * model.load_arm[k, 0] - s * model.load_arm[k, 1]
-            ry = s * model.load_arm[k, 0] + c * model.load_arm[k, 1]
-            turn[b + 2] -= rx * x + ry * y
+        arm_x, arm_y = model.load_arm[k, 0], model.load_arm[k, 1]
+        _push_tangent(model, model.load_body[k], model.load_follows[k], arm_x, arm_y, x, y, q, turn)
+
+
+@inline
+def _push_tangent(model, body, follows, arm_x, arm_y, x, y, q, turn):
+    """Add the derivative of `_push` by the angle of its body.
+
+    model: the compiled scene.
+    body: which. follows: whether the force turns with it.
+    arm_x, arm_y: the point, in the body's frame (m).
+    x, y: the force (N).
+    q (n,): coordinates (m, rad).
+    turn (n,): in and out.
+    """
+    b = 3 * body
+    c, s, _, _ = turned_body(model.home, body, q[b + 2])
+    if follows:  # force and arm turn together: the moment stays
+        turn[b] -= s * x + c * y
+        turn[b + 1] += c * x - s * y
+    else:
+        rx = c * arm_x - s * arm_y
+        ry = s * arm_x + c * arm_y
+        turn[b + 2] -= rx * x + ry * y
+
+
+@kernel
+def add_timed_tangent(model, segment, t, q, turn):
+    """turn (n,) += derivative of the loads of `add_timed_loads` by the angle of their body."""
+    for k in range(model.timed_load.shape[0]):
+        if model.timed_load[k, KIND] == MOMENT:
+            continue
+        size = timed_load_size(model, segment, k, t)
+        arm = model.timed_arm[k]
+        x, y = size * arm[DIRECTION], size * arm[DIRECTION + 1]
+        body, follows = model.timed_load[k, BODY], model.timed_load[k, TURNS]
+        _push_tangent(model, body, follows, arm[ARM], arm[ARM + 1], x, y, q, turn)
 
 
 @part

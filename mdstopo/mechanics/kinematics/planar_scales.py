@@ -4,6 +4,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import part
 from mdstopo.mechanics.kinematics.planar_poses import DX, DY, UC, US, UX, UY
+from mdstopo.mechanics.kinematics.timed import ARM, BODY, KIND, MOMENT, most_of_load
 
 
 @part
@@ -36,6 +37,20 @@ def gross_loads(model, out):
         out[b] += most
         out[b + 1] += most
         out[b + 2] += most * (abs(model.load_arm[k, 0]) + abs(model.load_arm[k, 1]))
+
+
+@part
+def add_gross_timed_loads(model, out):
+    """Add to out (n,) the largest sizes of loads that are formulas of time, of a general scene."""
+    for k in range(model.timed_load.shape[0]):
+        most = most_of_load(model, k)
+        b = 3 * model.timed_load[k, BODY]
+        if model.timed_load[k, KIND] == MOMENT:
+            out[b + 2] += most
+            continue
+        out[b] += most
+        out[b + 1] += most
+        out[b + 2] += most * (abs(model.timed_arm[k, ARM]) + abs(model.timed_arm[k, ARM + 1]))
 
 
 @part

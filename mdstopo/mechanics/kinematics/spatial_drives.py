@@ -1,13 +1,13 @@
 """Prescribed motions in space: x, y, z of centres of mass, and whole rotations.
 
-Each driven coordinate of a centre of mass is a cubic of time within a segment. A driven rotation is a turn Q since the
-start in axes of its own, which a frame H at home leads to: R(t) = R_home E with
+Each driven coordinate of a centre of mass is a cubic of time within a segment, or a formula. A driven rotation is a
+turn Q since the start in axes of its own, which a frame H at home leads to: R(t) = R_home E with
 
     E = H^T Q H,    v = H^T Q^T omega,    a = H^T Q^T omega'      (omega, omega' in the drive's axes)
 
 because the rate of v is that of omega as the body sees it: omega x omega is nothing. Either Q = Q_z Q_y Q_x of three
-angles that are cubics of time, or omega is linear in time within a segment. Then Q goes on from a row of a table by the
-exponential of Magnus' series (S. Blanes, F. Casas, J. Ros, BIT 40, 2000; here of vectors), with
+angles that are cubics or formulas of time, or omega is linear in time within a segment. Then Q goes on from a row of a
+table by the exponential of Magnus' series (S. Blanes, F. Casas, J. Ros, BIT 40, 2000; here of vectors), with
 a = h omega(middle), b = h^2 omega' and c = a x b
 
     Omega = a - c/12 + a x (a x c)/720 + c x b/240 - c x (a x c)/14400,
@@ -20,6 +20,7 @@ import math
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.kinematics.rotations import exponential, inverse, product
 from mdstopo.mechanics.kinematics.spatial_poses import COORDINATES, FREEDOMS
+from mdstopo.mechanics.kinematics.timed import driven_coordinate
 from mdstopo.mechanics.kinematics.vectors import cross, plus, put, times, turned_back
 
 #: columns of `GeneralModel.drive_frame`: H by rows, the first row of `drive_turn`, the one behind the last: the same
@@ -48,21 +49,11 @@ def _turned_by(e, a):
 
 
 @part
-def _angle(c, tau):
-    """An angle, its rate and its acceleration at a time tau after the start of a segment."""
-    return (
-        c[0] + tau * (c[1] + tau * (c[2] + tau * c[3])),
-        c[1] + tau * (2.0 * c[2] + 3.0 * tau * c[3]),
-        2.0 * c[2] + 6.0 * tau * c[3],
-    )
-
-
-@part
-def _turn_of_angles(drive, i, tau):
-    """Q, omega, omega' of roll, pitch and yaw; drive (n_driven, 4): cubics, those of the angles from row i on."""
-    roll = _angle(drive[i], tau)
-    pitch = _angle(drive[i + 1], tau)
-    yaw = _angle(drive[i + 2], tau)
+def _turn_of_angles(model, segment, t, i):
+    """Q, omega, omega' of roll, pitch and yaw, driven coordinates i and those behind it."""
+    roll = driven_coordinate(model, segment, t, i)
+    pitch = driven_coordinate(model, segment, t, i + 1)
+    yaw = driven_coordinate(model, segment, t, i + 2)
     about_z = (math.cos(0.5 * yaw[0]), 0.0, 0.0, math.sin(0.5 * yaw[0]))
     about_y = (math.cos(0.5 * pitch[0]), 0.0, math.sin(0.5 * pitch[0]), 0.0)
     about_x = (math.cos(0.5 * roll[0]), math.sin(0.5 * roll[0]), 0.0, 0.0)
@@ -109,22 +100,19 @@ def _turn_of_rates(model, segment, t, i, k):
 def _turn(model, segment, t, i, k):
     """Q, omega, omega' of a driven rotation; as `_turn_of_rates`."""
     if model.drive_frame[k, FIRST] == model.drive_frame[k, BEHIND]:
-        return _turn_of_angles(model.drive[segment], i, t - model.times[segment])
+        return _turn_of_angles(model, segment, t, i)
     return _turn_of_rates(model, segment, t, i, k)
 
 
 @kernel
 def drive_state(model, segment, t, q, v):
     """The driven part of a state; see `kinematics_interface.drive_state`."""
-    tau = t - model.times[segment]
     k = 0
     for i in range(model.driven.shape[0]):
         d = model.driven[i]
         place = COORDINATES * (d // FREEDOMS) + d % FREEDOMS
         if d % FREEDOMS < 3:
-            c = model.drive[segment, i]
-            q[place] = c[0] + tau * (c[1] + tau * (c[2] + tau * c[3]))
-            v[d] = c[1] + tau * (2.0 * c[2] + 3.0 * tau * c[3])
+            q[place], v[d], _ = driven_coordinate(model, segment, t, i)
         elif d % FREEDOMS == 3:
             e, omega, _ = _turn(model, segment, t, i, k)
             frame = model.drive_frame[k]
@@ -137,13 +125,11 @@ def drive_state(model, segment, t, q, v):
 @kernel
 def drive_acceleration(model, segment, t, a):
     """The driven accelerations; see `kinematics_interface.drive_acceleration`."""
-    tau = t - model.times[segment]
     k = 0
     for i in range(model.driven.shape[0]):
         d = model.driven[i]
         if d % FREEDOMS < 3:
-            c = model.drive[segment, i]
-            a[d] = 2.0 * c[2] + 6.0 * tau * c[3]
+            _, _, a[d] = driven_coordinate(model, segment, t, i)
         elif d % FREEDOMS == 3:
             e, _, alpha = _turn(model, segment, t, i, k)
             put(a, d, turned_back(model.drive_frame[k], 0, _turned_by(inverse(e), alpha)))

@@ -19,6 +19,7 @@ from mdstopo.mechanics.kinematics.spatial_poses import (
     W,
     fill_attitude,
 )
+from mdstopo.mechanics.kinematics.timed import ARM, BODY, DIRECTION, KIND, PUSH, TURNS, timed_load_size
 from mdstopo.mechanics.kinematics.vectors import (
     add,
     cross,
@@ -67,25 +68,55 @@ def add_loads(model, segment, t, q, v, f):
         d = FREEDOMS * body
         omega = vector_at(v, d + 3)
         add(f, d + 3, cross(_inertia_times(model, d, omega), omega))
-    if model.load_body.shape[0] == 0:
+    if model.load_body.shape[0] == 0 and model.timed_load.shape[0] == 0:
         return
     attitude = np.empty(ATTITUDE)
     for k in range(model.load_body.shape[0]):
-        body = model.load_body[k]
-        d = FREEDOMS * body
-        fill_attitude(model.home, body, q, attitude, 0)
+        fill_attitude(model.home, model.load_body[k], q, attitude, 0)
         push = _load(model, segment, k, 0, tau)
         moment = _load(model, segment, k, 3, tau)
         arm = vector_at(model.load_arm[k], 0)
-        if model.load_follows[k] == FOLLOWS:
-            add(f, d, turned(attitude, TURN, push))
-        else:
-            add(f, d, push)
-            push = turned_back(attitude, TURN, push)
-            moment = turned_back(attitude, TURN, moment)
-            if model.load_follows[k] == ACCELERATES:
-                moment = _inertia_times(model, d, moment)
-        add(f, d + 3, plus(cross(arm, push), moment))
+        _apply(model, model.load_body[k], model.load_follows[k], arm, push, moment, attitude, f)
+    for k in range(model.timed_load.shape[0]):
+        body = model.timed_load[k, BODY]
+        fill_attitude(model.home, body, q, attitude, 0)
+        arm, push, moment = _timed_load(model, segment, k, t)
+        _apply(model, body, model.timed_load[k, TURNS], arm, push, moment, attitude, f)
+
+
+@part
+def _timed_load(model, segment, k, t):
+    """Point of attack, force and moment of a load that is a formula of time, of which it is one."""
+    size = timed_load_size(model, segment, k, t)
+    vector = times(size, vector_at(model.timed_arm[k], DIRECTION))
+    nothing = (0.0, 0.0, 0.0)
+    arm = vector_at(model.timed_arm[k], ARM)
+    if model.timed_load[k, KIND] == PUSH:
+        return arm, vector, nothing
+    return arm, nothing, vector
+
+
+@part
+def _apply(model, body, follows, arm, push, moment, attitude, f):
+    """Add a force at a point of a body, and a moment.
+
+    model: the compiled scene.
+    body, follows: which, and as `load_follows`.
+    arm: the point, in the body's frame (m).
+    push, moment: the force (N), the moment (N m).
+    attitude (ATTITUDE,): of the body.
+    f (n,): in and out.
+    """
+    d = FREEDOMS * body
+    if follows == FOLLOWS:
+        add(f, d, turned(attitude, TURN, push))
+    else:
+        add(f, d, push)
+        push = turned_back(attitude, TURN, push)
+        moment = turned_back(attitude, TURN, moment)
+        if follows == ACCELERATES:
+            moment = _inertia_times(model, d, moment)
+    add(f, d + 3, plus(cross(arm, push), moment))
 
 
 @kernel
@@ -105,33 +136,50 @@ def load_tangent(model, segment, t, q, v, turn):
             slope = minus(cross(spin, e), cross(omega, _inertia_times(model, d, e)))
             for i in range(3):
                 turn[d + 3 + i, ROTATIONS + c] = slope[i]
-    if model.load_body.shape[0] == 0:
+    if model.load_body.shape[0] == 0 and model.timed_load.shape[0] == 0:
         return
     attitude = np.empty(ATTITUDE)
     for k in range(model.load_body.shape[0]):
-        body = model.load_body[k]
-        d = FREEDOMS * body
-        fill_attitude(model.home, body, q, attitude, 0)
+        fill_attitude(model.home, model.load_body[k], q, attitude, 0)
         push = _load(model, segment, k, 0, tau)
         moment = _load(model, segment, k, 3, tau)
         arm = vector_at(model.load_arm[k], 0)
-        follows = model.load_follows[k]
-        if follows != FOLLOWS:
-            push = turned_back(attitude, TURN, push)
-            moment = turned_back(attitude, TURN, moment)
-        for c in range(3):
-            e = unit(c)
-            if follows == FOLLOWS:
-                slope = turned(attitude, TURN, cross(e, push))
-                for i in range(3):
-                    turn[d + i, c] += slope[i]
-                continue
-            slope = cross(moment, e)
-            if follows == ACCELERATES:
-                slope = _inertia_times(model, d, slope)
-            slope = plus(slope, cross(arm, cross(push, e)))
+        _add_slopes(model, model.load_body[k], model.load_follows[k], arm, push, moment, attitude, turn)
+    for k in range(model.timed_load.shape[0]):
+        body = model.timed_load[k, BODY]
+        fill_attitude(model.home, body, q, attitude, 0)
+        arm, push, moment = _timed_load(model, segment, k, t)
+        _add_slopes(model, body, model.timed_load[k, TURNS], arm, push, moment, attitude, turn)
+
+
+@part
+def _add_slopes(model, body, follows, arm, push, moment, attitude, turn):
+    """Add the slopes of what `_apply` adds by the body's turn.
+
+    model: the compiled scene.
+    body, follows: which, and as `load_follows`.
+    arm: the point, in the body's frame (m).
+    push, moment: the force (N), the moment (N m).
+    attitude (ATTITUDE,): of the body.
+    turn (n, 6): in and out.
+    """
+    d = FREEDOMS * body
+    if follows != FOLLOWS:
+        push = turned_back(attitude, TURN, push)
+        moment = turned_back(attitude, TURN, moment)
+    for c in range(3):
+        e = unit(c)
+        if follows == FOLLOWS:
+            slope = turned(attitude, TURN, cross(e, push))
             for i in range(3):
-                turn[d + 3 + i, c] += slope[i]
+                turn[d + i, c] += slope[i]
+            continue
+        slope = cross(moment, e)
+        if follows == ACCELERATES:
+            slope = _inertia_times(model, d, slope)
+        slope = plus(slope, cross(arm, cross(push, e)))
+        for i in range(3):
+            turn[d + 3 + i, c] += slope[i]
 
 
 @kernel

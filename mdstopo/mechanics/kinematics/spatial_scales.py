@@ -6,6 +6,7 @@ from mdstopo.compiler.jit import part
 from mdstopo.mechanics.kinematics.rotations import quaternion_at, turn_between
 from mdstopo.mechanics.kinematics.spatial_forces import ACCELERATES
 from mdstopo.mechanics.kinematics.spatial_poses import COORDINATES, FREEDOMS, HOME_PLACE, D, W, deflection_of
+from mdstopo.mechanics.kinematics.timed import ARM, BODY, KIND, PUSH, TURNS, most_of_load
 from mdstopo.mechanics.kinematics.vectors import norm, vector_at
 
 
@@ -122,6 +123,16 @@ def gross_loads(model, out):
         for axis in range(3):
             out[b + axis] += most
             out[b + 3 + axis] += most * arm + couple
+    for k in range(model.timed_load.shape[0]):
+        b = FREEDOMS * model.timed_load[k, BODY]
+        most = most_of_load(model, k)
+        if model.timed_load[k, TURNS] == ACCELERATES:
+            most *= max(model.mass[b + 3], model.mass[b + 4], model.mass[b + 5])
+        arm = norm(vector_at(model.timed_arm[k], ARM))
+        push = 1.0 if model.timed_load[k, KIND] == PUSH else 0.0
+        for axis in range(3):
+            out[b + axis] += push * most
+            out[b + 3 + axis] += most * (push * arm + 1.0 - push)
 
 
 @part

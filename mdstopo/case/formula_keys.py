@@ -1,0 +1,91 @@
+"""Formulas in case files, and what they have names for. See `mdstopo.case.kinds`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mdstopo.case.kinds import Kind, Schema
+from mdstopo.case.nodes import MAPPING, SCALAR, Node
+from mdstopo.case.reading import BAD, Reading, found
+from mdstopo.case.value import Value, frozen
+from mdstopo.case.words import inside, shown
+from mdstopo.formula.errors import FormulaError
+from mdstopo.formula.parser import WORD, parse, reserved
+
+#: the name of the time in a formula, s
+TIME = "t"
+
+
+@frozen
+class FormulaText(Value):
+    """A formula. without: names of a motion that it may not use, with the reason."""
+
+    without: tuple[str, ...] = ()
+    why: str = ""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """str or BAD; whether names are known is checked where the law's parameters are."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            value = node.text
+        if not isinstance(value, str):
+            reading.mistake(path, f"found {found(node)}, allowed is an expression", node)
+            return BAD
+        try:
+            formula = parse(value)
+        except FormulaError as error:
+            reading.mistake(path, str(error), node)
+            return BAD
+        for part, column in formula.columns.items():
+            if part.word in self.without:
+                why = f"{part.word!r} is not allowed here: {self.why} (column {column} of the expression)"
+                reading.mistake(path, why, node)
+                return BAD
+        reading.mark(path, node)
+        return value
+
+    def schema(self) -> Schema:
+        """string, or a number, which is a formula too."""
+        return {"type": ["string", "number"]}
+
+
+@frozen
+class FormulaNames(Value):
+    """Values of one kind by the names that a formula has for them.
+
+    what: their plural; at_least, most: how many there may be.
+    """
+
+    item: Kind
+    what: str
+    at_least: int = 0
+    most: int = 20
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """dict (values may be BAD) or BAD."""
+        if node.kind != MAPPING or not self.at_least <= len(node.entries) <= self.most:
+            how_many = (
+                f"{self.at_least} to {self.most} {self.what}" if self.at_least else f"{self.most} {self.what} at most"
+            )
+            reading.mistake(path, f"found {found(node)}, allowed is a mapping from names to {how_many}", node)
+            return BAD
+        values = {}
+        for word, (key, value) in node.entries.items():
+            here = inside(path, word)
+            reading.mark(here, value, key)
+            values[word] = self.item.read(value, here, reading)
+            if not WORD.fullmatch(word):
+                allowed = "allowed is a letter (a to z, A to Z) or _, then letters, digits or _"
+                reading.mistake(here, f"found the name {shown(word)}, {allowed}", key)
+                values[word] = BAD
+            elif word == TIME or reserved(word):
+                reading.mistake(here, f"the name {word!r} is taken: it means something in every expression", key)
+                values[word] = BAD
+        return values
+
+    def schema(self) -> Schema:
+        """object of values."""
+        return {
+            "type": "object", "propertyNames": {"pattern": f"^{WORD.pattern}$"}, "minProperties": self.at_least,
+            "maxProperties": self.most, "additionalProperties": self.item.schema(),
+        }  # fmt: skip

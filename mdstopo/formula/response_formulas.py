@@ -1,0 +1,71 @@
+"""What kernels ask of the formula of a response: its value, slopes, and margins of its switches, in groups.
+
+Names in it are "p 0" and so on: first of the responses that it is made of, then of its parameters; and t.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+from mdstopo.formula.calculus import ONE, derivative, is_number, substituted
+from mdstopo.formula.law_formulas import Group, group_of, limited, lowest_of
+from mdstopo.formula.modes import smooth
+from mdstopo.formula.parser import parse
+from mdstopo.formula.tree import NUMBER, Expression, name, names_in
+
+#: group of the value and its slope by t; that of the smallest margin; the first of those with slopes by responses
+VALUE, LOWEST, SLOPES = 0, 1, 2
+#: slopes in a group
+WIDTH = 5
+
+
+class ResponseProgram(NamedTuple):
+    """Groups of formulas of a response.
+
+    parts: how many groups its slopes by responses take; those of a margin follow its value, which is a group with its
+    slope by t and whether it is looked at. switches: how many kinks and jumps it has.
+    is_timed: whether t is in it. is_norm: whether it is a root (times a number above 0), which has a kink at zero.
+    """
+
+    groups: tuple[Group, ...]
+    parts: int
+    switches: int
+    is_timed: bool
+    is_norm: bool
+
+
+@functools.lru_cache(maxsize=256)
+def response_program(text: str, names: tuple[str, ...], responses: int) -> ResponseProgram:
+    """Value, derivatives and switches of a formula. Raises TooManySwitchesError.
+
+    names: of the responses, which come first, and of the parameters. responses: how many they are.
+    """
+    root = substituted(parse(text).root, {name(word): name(f"p {place}") for place, word in enumerate(names)})
+    moving = [f"p {place}" for place in range(responses)]
+    found = smooth((root,), (*moving, "t"))
+    (f,) = found.formulas
+    margins = [switch.margin for switch in found.switches]
+    groups = [group_of((f, derivative(f, "t")), limited([(f, ONE)])), group_of((lowest_of(margins, found.switches),))]
+    groups += _slopes(f, moving)
+    for switch in found.switches:
+        groups.append(group_of((switch.margin, derivative(switch.margin, "t"), switch.relevant)))
+        groups += _slopes(switch.margin, moving)
+    parts = -(-responses // WIDTH)
+    return ResponseProgram(tuple(groups), parts, len(margins), "t" in names_in(root), _is_norm(root))
+
+
+def _slopes(formula: Expression, moving: list[str]) -> list[Group]:
+    """Derivatives by some names, as many groups as they need."""
+    slopes = [derivative(formula, word) for word in moving]
+    return [group_of(tuple(slopes[first : first + WIDTH])) for first in range(0, len(slopes), WIDTH)]
+
+
+def _is_norm(root: Expression) -> bool:
+    """Whether a formula is a root, perhaps times or by a number above 0."""
+    if root.operator in ("*", "/"):
+        left, right = root.operands
+        if right.operator == NUMBER and right.value > 0.0:
+            return _is_norm(left)
+        return root.operator == "*" and left.operator == NUMBER and left.value > 0.0 and _is_norm(right)
+    return root.operator == "sqrt" or (root.operator == "^" and is_number(root.operands[1], 0.5))

@@ -1,0 +1,155 @@
+"""Loads and motions that are formulas of time, as arrays of a general scene, and the times at which they have kinks.
+
+A kink or a jump of a formula is where a margin of it vanishes (`formula.modes`); there segments end, as at a row of a
+table, and in each segment the formula is the smooth one of the sides on which its switches are in the middle.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mdstopo.case.arrays import TimeFormula
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import GROUND, Case, LoadCase
+from mdstopo.compiler.formulas import address_of, call_formula
+from mdstopo.formula.time_formulas import MARGIN, VALUE
+from mdstopo.general.leading_members import roots_between
+from mdstopo.mechanics.kinematics.timed import ADDRESS, MOST, OFFSET, SCALE, TURNS, WIDTH
+from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.signals import formulas_of, signals_of
+
+#: parts of the simulated time in which a kink is looked for
+PARTS = 2048
+
+
+class TimedPart(NamedTuple):
+    """One component of a load that is a formula: what acts, as `load_follows`, its direction, its point of attack."""
+
+    signal: TimeFormula
+    kind: int
+    follows: int
+    direction: tuple[float, ...]
+    arm: tuple[float, ...]
+
+
+class Timed(NamedTuple):
+    """The fields of a model with loads that are formulas (`GeneralModel`)."""
+
+    timed_load: IndexArray
+    timed_arm: FloatArray
+    timed_par: FloatArray
+    timed_mode: IndexArray
+
+
+class _Called:
+    """A formula's machine code, called from Python."""
+
+    def __init__(self, formula: TimeFormula) -> None:
+        self.row = row_of_formula(formula)
+        self.switches = formula.program.switches
+
+    def group(self, group: int, time: float, mode: int) -> tuple[float, ...]:
+        """The numbers of a group."""
+        found: tuple[float, ...] = call_formula(self.row[ADDRESS], self.row, 0.0, 0.0, time, 0.0, mode, group)
+        return found
+
+    def mode(self, time: float, switches: int | None = None) -> int:
+        """Bits of the first so many switches, of which later ones depend on earlier ones; None: of all."""
+        mode = 0
+        for switch in range(self.switches if switches is None else switches):
+            if self.group(MARGIN + switch, time, mode)[0] >= 0.0:
+                mode |= 1 << switch
+        return mode
+
+    def margin(self, switch: int, time: float) -> tuple[float, ...]:
+        """The margin of a switch, and its rate."""
+        return self.group(MARGIN + switch, time, self.mode(time, switch))[:2]
+
+
+def row_of_formula(formula: TimeFormula) -> FloatArray:
+    """(WIDTH,): the parameters, the machine code, factor and summand of a formula (`kinematics.timed`)."""
+    row = np.zeros(WIDTH)
+    values = [value for _, value in formula.parameters]
+    row[: len(values)] = values
+    row[ADDRESS], row[SCALE], row[OFFSET] = float(address_of(formula.program.groups)), formula.scale, formula.offset
+    assert len(values) <= MOST
+    return row
+
+
+def modes(formula: TimeFormula, times: FloatArray) -> IndexArray:
+    """(n_seg,): bits of a formula's switches in segments with these ends (s)."""
+    called = _Called(formula)
+    return np.array([called.mode(time) for time in (0.5 * (times[:-1] + times[1:])).tolist()], dtype=np.int64)
+
+
+def at_ends(formula: TimeFormula, times: FloatArray) -> FloatArray:
+    """(n_seg, 2, 2): value and rate of a formula at both ends of segments, on their side."""
+    called = _Called(formula)
+    out = np.empty((len(times) - 1, 2, 2))
+    for k, mode in enumerate(modes(formula, times).tolist()):
+        for end in range(2):
+            value, rate, *_ = called.group(VALUE, float(times[k + end]), mode)
+            out[k, end] = called.row[SCALE] * value + called.row[OFFSET], called.row[SCALE] * rate
+    return out
+
+
+def kink_times(case: Case, load_case: LoadCase) -> list[float]:
+    """The times at which formulas of a load case have kinks or jumps. CaseError where one has no value at some time."""
+    found: list[float] = []
+    grid = np.linspace(load_case.start, load_case.end, PARTS + 1)
+    for formula in formulas_of(load_case):
+        called = _Called(formula)
+        found += _kinks(called, grid)
+        for time in grid.tolist():
+            if not np.isfinite(called.group(VALUE, time, called.mode(time))[0]):
+                places = [f"load_cases.{load_case.name}", "loads" if _is_load(load_case, formula) else "motions"]
+                path = next((path for path in places if path in case.marks), places[-1])
+                message = f"the expression {formula.text} has no value at t = {time:.6g} s"
+                raise CaseError([case.marks.mistake(path, message)], str(case.path or case.name))
+    return found
+
+
+def _is_load(load_case: LoadCase, formula: TimeFormula) -> bool:
+    return any(signal is formula for load in load_case.loads for signal in signals_of(load))
+
+
+def _kinks(called: _Called, grid: FloatArray) -> Iterator[float]:
+    """Where margins vanish between times of a grid."""
+    for switch in range(called.switches):
+        margin, rate = np.array([called.margin(switch, time) for time in grid.tolist()]).T
+        rate *= grid[1] - grid[0]
+
+        def exact(times: FloatArray, switch: int = switch) -> FloatArray:
+            return np.array([called.margin(switch, time)[0] for time in times.tolist()])
+
+        turns = (margin[:-1] >= 0.0) != (margin[1:] >= 0.0)
+        dips = (margin[:-1] * rate[:-1] < 0.0) & (margin[1:] * rate[1:] > 0.0)
+        for k in np.flatnonzero(turns | dips).tolist():
+            span = float(grid[k]), float(grid[k + 1])
+            values = float(margin[k]), float(margin[k + 1])
+            yield from roots_between(span, values, (float(rate[k]), float(rate[k + 1])), exact)
+
+
+def timed_loads(parts: Iterable[tuple[int, TimedPart]], times: FloatArray) -> Timed:
+    """The arrays of loads that are formulas.
+
+    parts: of each the body's place in the state. times (n_seg + 1,): ends of the segments (s).
+    """
+    whole = list(parts)
+    arms = np.zeros((len(whole), 6))
+    for row, (_, part) in zip(arms, whole, strict=True):
+        row[: len(part.direction)], row[3 : 3 + len(part.arm)] = part.direction, part.arm
+    sides: list[Any] = [modes(part.signal, times) for _, part in whole]
+    return Timed(
+        np.array([[body, part.kind, part.follows] for body, part in whole], dtype=np.int64).reshape(-1, TURNS + 1),
+        arms,
+        np.array([row_of_formula(part.signal) for _, part in whole]).reshape(-1, WIDTH),
+        np.array(sides, dtype=np.int64).reshape(len(whole), len(times) - 1).T.copy(),
+    )
+
+
+def parts_of(load_case: LoadCase, of_load: Any, index: dict[str, int]) -> list[tuple[int, TimedPart]]:
+    """The formulas of all loads with their bodies. of_load (load): those of one."""
+    loads = [load for load in load_case.loads if load.body != GROUND]
+    return [(index[load.body], part) for load in loads for part in of_load(load)]

@@ -1,0 +1,182 @@
+"""Responses that are expressions of others: the same as built-in ones, and gradients through their kinks and jumps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mdstopo
+from mdstopo.case.errors import CaseError
+from mdstopo.case.reader import read_case
+from mdstopo.status import Status
+from tests.variables.support import differences
+
+PLANE = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 0.4}
+bodies:
+  load: {mass: 20, inertia: 0.5, position: [0, 0], velocity: [2, 0.4], angular_velocity: 1.5}
+points:
+  corners: {body: load, grid: {list: [[0.2, 0.2], [-0.21, 0.17], [0.19, -0.2], [-0.23, -0.22]]}}
+  hooks: {body: ground, grid: {list: [[-1, 1.05], [1.1, 1]]}}
+members:
+  belts: {from: corners, to: hooks, law: {type: spring, stiffness: 2000, damping: 20}}
+design: {initial: 0.5}
+"""
+SPACE = (
+    PLANE.replace("format: 1", "format: 1\ndimension: 3")
+    .replace("[0, -9.81]", "[0, -9.81, 0]")
+    .replace(
+        "inertia: 0.5, position: [0, 0], velocity: [2, 0.4]",
+        "inertia: [0.5, 0.4, 0.6], position: [0, 0, 0], velocity: [2, 0.4, 0.2]",
+    )
+    .replace("angular_velocity: 1.5", "angular_velocity: [0.4, 1, 1.5]")
+    .replace("[[0.2, 0.2], [-0.21, 0.17], [0.19, -0.2], [-0.23, -0.22]]", "[[0.2, 0.2, 0], [-0.2, 0.1, 0.1]]")
+    .replace("[[-1, 1.05], [1.1, 1]]", "[[-1, 1, 0.3], [1, 1, -0.4]]")
+)
+
+
+def part(word: str, component: str = "") -> str:
+    """A response of the body, perhaps one component."""
+    return f"{{{word}: {{body: load{f', component: {component}' if component else ''}}}}}"
+
+
+def expression(formula: str, parameters: str = "", **of: str) -> str:
+    """A response that is an expression of others."""
+    named = ", ".join(f"{name}: {response}" for name, response in of.items())
+    more = f", parameters: {{{parameters}}}" if parameters else ""
+    return f'{{expression: {{formula: "{formula}", of: {{{named}}}{more}}}}}'
+
+
+AX, AY, VX, DX = part("acceleration", "x"), part("acceleration", "y"), part("velocity", "x"), part("displacement", "x")
+A = part("acceleration")
+
+
+def looking(text: str, objectives: dict[str, tuple[str, str]], **solver: object) -> Any:
+    """The case with these objectives: by name a response, and what becomes of it over time."""
+    lines = [f"  {name}: {{response: {response}, over_time: {how}}}" for name, (response, how) in objectives.items()]
+    weights = ", ".join(f"{name}: 1" for name in objectives)
+    case = "\n".join([text, "objectives:", *lines, f"combine: {{weights: {{{weights}}}, normalize: false}}"])
+    return read_case(case, overrides={f"solver.{key}": value for key, value in solver.items()})
+
+
+#: built-in responses, and the same as expressions
+SAME = {
+    "acceleration": (A, expression("sqrt(x^2 + y^2)", x=AX, y=AY)),
+    "velocity": (part("velocity"), expression("(x^2 + y^2)^0.5", x=VX, y=part("velocity", "y"))),
+    "displacement": (DX, expression("3*x/k", "k: 3", x=DX)),
+}
+
+
+@pytest.mark.parametrize("over_time", ["max", "max_abs", "min", "mean", "rms", "final"])
+def test_a_built_in_response_written_as_an_expression_is_the_same(over_time: str) -> None:
+    found = [
+        mdstopo.evaluate(looking(PLANE, {name: (pair[which], over_time) for name, pair in SAME.items()}))
+        for which in range(2)
+    ]
+    for name in SAME:
+        assert found[1].objectives[name] == pytest.approx(found[0].objectives[name], rel=1e-12)
+        of_one, of_other = (each.gradients[name] for each in found)
+        assert np.abs(of_other - of_one).max() <= 1e-10 * np.abs(of_one).max()
+
+
+#: with kinks, jumps, roots at zero, time and stored energy in them
+KINKED = {
+    "least": (expression("min(x + 1, y/10)", x=DX, y=A), "max"),
+    "largest": (expression("max(-x, x/2, y/5 - 3)", x=VX, y=A), "min"),
+    "chosen": (expression("if(v > 0, x, y)", v=VX, x=AX, y=AY), "max_abs"),
+    "jump": (expression("if(v > 0, x, 0)", v=VX, x=A), "max"),
+    "travel": (expression("abs(x)", x=VX), "integral"),
+    "excess": (expression("max(abs(x) - 1, 0)^2", x=VX), "mean"),
+    "time_above": (expression("step(x - m)", "m: 15", x=A), "integral"),
+    "squares": (expression("if(x > 15, x, 2) + e", x=A, e="energy"), "rms"),
+    "deviation": (expression("abs(x - 0.3*t)", x=DX), "mean"),
+    "root": (expression("sqrt(v^2)", v=VX), "mean"),
+    "energy": (expression("e*abs(v)", e="energy", v=VX), "max"),
+    "at_end": (expression("max(e, v)", e="energy", v=VX), "final"),
+}
+
+
+@pytest.mark.parametrize(("integrator", "tolerance", "error"), [("runge_kutta", 1e-11, 2e-8)])
+def test_gradients_through_kinks_and_jumps_are_those_of_differences(
+    integrator: str, tolerance: float, error: float
+) -> None:
+    case = looking(PLANE, KINKED, integrator=integrator, tolerance=tolerance)
+    design, direction = np.linspace(0.3, 0.9, 8), np.array([1.0, -2.0, 1.5, 0.5, -1.0, 2.0, 1.0, -0.5])
+    found = mdstopo.evaluate(case, design)
+    expected = differences(case, design, direction, 1e-3)
+    for name, gradient in found.gradients.items():
+        size = float(np.abs(gradient) @ np.abs(direction))
+        assert size > 0.0, name
+        assert abs(gradient @ direction - expected[name]) <= error * size, name
+
+
+@pytest.mark.parametrize(("integrator", "methods"), [("runge_kutta", ["direct"]), ("generalized_alpha", ["iterative"])])
+def test_the_methods_of_differentiation_agree_on_expressions(integrator: str, methods: list[str]) -> None:
+    design = np.linspace(0.3, 0.9, 8)
+    some = {name: KINKED[name] for name in ("least", "jump", "squares")}
+    adjoint = mdstopo.evaluate(looking(PLANE, some, integrator=integrator, tolerance=1e-4), design)
+    for method in methods:
+        case = looking(PLANE, some, integrator=integrator, tolerance=1e-4, sensitivity=method)
+        other = mdstopo.evaluate(case, design)
+        for name, gradient in adjoint.gradients.items():
+            assert np.abs(other.gradients[name] - gradient).max() <= 1e-9 * np.abs(gradient).max(), name
+
+
+def test_in_space_expressions_are_the_same_and_have_the_derivatives_of_differences() -> None:
+    az = part("acceleration", "z")
+    objectives = {
+        "norm": (expression("sqrt(x^2 + y^2 + z^2)", x=AX, y=AY, z=az), "max"),
+        "built_in": (A, "max"),
+        "least": (expression("min(20*x + 8, y)", x=DX, y=A), "max"),
+        "turned": (expression("max(x - 0.4, 0)", x="{tilt: {body: load}}"), "integral"),
+    }
+    case = looking(SPACE, objectives, tolerance=1e-10)
+    design, direction = np.linspace(0.3, 0.9, 4), np.array([1.0, -2.0, 1.5, 0.5])
+    found = mdstopo.evaluate(case, design)
+    assert found.objectives["norm"] == pytest.approx(found.objectives["built_in"], rel=1e-12)
+    assert found.gradients["norm"] == pytest.approx(found.gradients["built_in"], rel=1e-10)
+    expected = differences(case, design, direction, 1e-3)
+    for name, gradient in found.gradients.items():
+        assert gradient @ direction == pytest.approx(expected[name], abs=1e-7 * float(np.abs(gradient).sum())), name
+
+
+@pytest.mark.parametrize("over_time", ["max", "mean"])
+def test_an_expression_without_a_value_is_told(over_time: str) -> None:
+    found = mdstopo.evaluate(looking(PLANE, {"G": (expression("log(x)", x=VX), over_time)}))
+    assert found.status is Status.NON_FINITE
+    assert "the expression log(x) has no value" in found.message
+
+
+def test_an_infinite_slope_is_no_gradient() -> None:
+    found = mdstopo.evaluate(looking(PLANE, {"G": (expression("abs(x)^(1/3)", x=DX), "min")}))
+    assert found.status is Status.NO_GRADIENT
+    assert "the expression abs(x)^(1/3) has an infinite slope" in found.message
+
+
+#: keys of an expression -> what the message has
+MALFORMED = {
+    'formula: "sqrt(chst^2)", of: {chest: energy}': "did you mean 'chest'? names are chest, t (column 6",
+    'formula: "chest + ", of: {chest: energy}': "found the end",
+    'formula: "__import__(1)", of: {chest: energy}': "there is no function '__import__'",
+    'formula: "x", of: {}': "allowed is a mapping from names to 1 to 20 responses",
+    'formula: "x", of: {x: {member_force: {group: belts}}}': "the largest of a group's members",
+    'formula: "t", of: {t: energy}': "the name 't' is taken",
+    'formula: "x", of: {x: {expression: {formula: "1", of: {y: energy}}}}': "unknown key 'expression'",
+    'formula: "x", of: {x: energy}, parameters: {x: 1}': "is a response already",
+    'formula: "x", of: {x: {velocity: {body: lode}}}': "did you mean 'load'?",
+    "of: {x: energy}": "the key 'formula' is missing",
+    f'formula: "{"+".join(f"abs(x - {i})" for i in range(41))}", of: {{x: energy}}': "allowed, which are 40",
+}
+
+
+@pytest.mark.parametrize("keys", MALFORMED)
+def test_a_mistake_is_told_with_its_place(keys: str) -> None:
+    with pytest.raises(CaseError) as caught:
+        looking(PLANE, {"G": (f"{{expression: {{{keys}}}}}", "max")})
+    text = str(caught.value)
+    assert "objectives.G.response.expression" in text
+    assert MALFORMED[keys] in text
