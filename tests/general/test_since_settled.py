@@ -189,3 +189,12 @@ def test_without_settle_it_is_refused_by_its_key():
         mdstopo.evaluate(case)
     with pytest.raises(CaseError, match="unknown key 'since'"):
         read_case(LAMP.replace("displacement: {body: lamp, component: y}", "velocity: {body: lamp, since: settled}"))
+
+
+def test_within_an_expression_it_is_refused_by_its_key():
+    expression = "{expression: {formula: 2*d, of: {d: {displacement: {body: lamp, component: y, since: settled}}}}}"
+    text = LAMP.replace("{displacement: {body: lamp, since: settled}}, over_time: max", f"{expression}, over_time: max")
+    assert text != LAMP
+    (mistake,) = refusals(read_case(text))
+    assert mistake.path_key == "objectives.far.response.expression.of.d.displacement.since"
+    assert "stated" in str(mistake)
