@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import NamedTuple, cast
 
@@ -111,8 +112,18 @@ class Predictions:
         key = b"" if self.numbers.laws_alone else x.tobytes()
         if self._kept is None or self._kept[0] != key:
             at = self.numbers.initial if self.numbers.laws_alone else x
-            self._kept = key, Evaluator(self.numbers.case_at(at), beside=False)
+            there = self.numbers.case_at(at)
+            solver = replace(there.solver, integrator=self._integrator)
+            self._kept = key, Evaluator(replace(there, solver=solver), beside=False)
         return self._kept[1]
+
+    @cached_property
+    def _integrator(self) -> str:
+        """The one that suits the numbers as stated, for all x: else `auto` chose anew, and differences were of two."""
+        try:
+            return Evaluator(self.numbers.case_at(self.numbers.initial), beside=False).integrator
+        except CaseError:  # the first motion says why
+            return self.case.solver.integrator
 
     def _times(self, load_case: str, delays: FloatArray) -> tuple[FloatArray, list[IndexArray]]:
         """Times (K,) of one load case at which something was measured, and where those of each series are."""

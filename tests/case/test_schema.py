@@ -56,7 +56,7 @@ def test_a_case_in_space_with_every_key_passes() -> None:
 
 def test_every_key_of_the_format_has_its_words_limits_and_defaults_in_the_schema() -> None:
     solver = json_schema()["else"]["else"]["properties"]["solver"]["properties"]
-    assert solver["integrator"]["enum"] == ["auto", "gauss", "runge_kutta", "generalized_alpha"]
+    assert solver["integrator"]["enum"] == ["auto", "gauss", "runge_kutta", "generalized_alpha", "esdirk"]
     assert solver["integrator"]["default"] == "auto"
     assert solver["tolerance"]["exclusiveMinimum"] == 0
     assert solver["tolerance"]["description"]

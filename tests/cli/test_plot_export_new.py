@@ -56,8 +56,9 @@ def test_everything_a_result_has_is_drawn(results, kind, tmp_path, monkeypatch):
     assert all(path.stat().st_size > 5000 for path in tmp_path.glob("*.png"))
 
 
-def test_every_picture_is_made_by_one_of_these_results(results):
-    assert set(PLOTS) == {name for path in results.values() for name in fitting(Source(path).view)}
+def test_every_picture_but_those_of_fits_is_made_by_one_of_these_results(results):
+    of_fits = {"fit", "correlation", "profiles"}  # in `tests/fit/test_seen.py`
+    assert set(PLOTS) - of_fits == {name for path in results.values() for name in fitting(Source(path).view)}
 
 
 @pytest.mark.parametrize("ending", ["svg", "pdf"])
