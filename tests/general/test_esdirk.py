@@ -63,6 +63,21 @@ objectives:
   V: {response: {velocity: {body: a, component: x}}, over_time: final}
 combine: {weights: {D: 1, V: 1}, normalize: false}
 """
+#: a body that sinks onto two stiff and strongly damped springs, and then hangs there
+HANGING = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 20}
+bodies: {a: {mass: 2, inertia: 0.3, position: [0, 0]}}
+points:
+  top: {body: a, grid: {list: [[-0.3, 0], [0.3, 0]]}}
+  hooks: {body: ground, grid: {list: [[-0.3, 1], [0.3, 1]]}}
+members:
+  s: {from: top, to: hooks, connect: pairs, law: {type: spring, stiffness: 1e6, damping: 1e4}}
+design: {initial: 0.5}
+objectives: {G: {response: {displacement: {body: a, component: y}}, over_time: final}}
+solver: {integrator: esdirk, tolerance: 1e-5}
+"""
 
 
 def pendulum(damping: float, **solver: object) -> mdstopo.Case:
@@ -145,6 +160,17 @@ def test_a_stop_and_friction_agree_with_the_explicit_method() -> None:
         assert found.objectives[name] == pytest.approx(exact.objectives[name], rel=1e-6)
         assert found.gradients[name] == pytest.approx(exact.gradients[name], rel=1e-5)
         assert other.gradients[name] == pytest.approx(found.gradients[name], rel=1e-8)
+
+
+def test_bodies_at_rest_on_stiff_springs_are_followed_in_long_steps() -> None:
+    """Newton's iteration ended as failed where bodies move by less than rounding in a step."""
+    case = read_case(HANGING)
+    found, (one, other) = mdstopo.evaluate(case), (0.5, 0.5)
+    height = -2.0 * 9.81 / (1e6 * (one + other))
+    assert found.status.ok
+    assert found.work["steps"] <= 300
+    assert found.objectives["G"] == pytest.approx(height, rel=1e-9)
+    assert found.gradients["G"] == pytest.approx(np.full(2, -height / (one + other)), rel=1e-6)
 
 
 def test_auto_takes_it_where_stability_holds_most_explicit_steps_short() -> None:
