@@ -173,6 +173,12 @@ def test_bodies_at_rest_on_stiff_springs_are_followed_in_long_steps() -> None:
     assert found.gradients["G"] == pytest.approx(np.full(2, -height / (one + other)), rel=1e-6)
 
 
+def test_auto_takes_it_where_explicit_steps_have_no_hope_to_reach_the_end() -> None:
+    text = PENDULUM.replace("DAMPING", "5e4").replace("{end: 1}", "{end: 100}")
+    chosen = Evaluator(read_case(text, overrides={"solver.tolerance": 1e-5}), beside=False)
+    assert chosen.integrator == "esdirk"
+
+
 def test_auto_takes_it_where_stability_holds_most_explicit_steps_short() -> None:
     chosen = {damping: Evaluator(pendulum(damping, tolerance=1e-5), beside=False) for damping in (500.0, 5e4)}
     assert chosen[500.0].integrator == "runge_kutta"
