@@ -11,6 +11,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.integrators.esdirk_tables import STAGES, esdirk_tables
 from mdstopo.integrators.runge_kutta_tables import BB, E_Q, E_V, VECTORS, A, B, C
+from mdstopo.status import Status
 
 OWN = slice(STAGES)
 #: a double pendulum whose end is held by a damped spring
@@ -187,6 +188,15 @@ def test_auto_takes_it_where_stability_holds_most_explicit_steps_short() -> None
     start = np.full(2, 0.5)
     assert chosen[5e4].evaluate(start).work["steps"] <= 1500
     assert chosen[500.0].evaluate(start).work["steps_held_short"] > 100
+
+
+def test_steps_for_integrals_that_are_too_many_end_with_a_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The motion alone may be computed: it was taken for all, and no value was found."""
+    evaluator = Evaluator(pendulum(500.0, integrator="esdirk", tolerance=1e-4), beside=False)
+    driver = evaluator.driver(next(iter(evaluator.scenes)))
+    found = driver.evaluate(np.full(2, 0.5), False)
+    monkeypatch.setattr(driver, "evaluate", lambda *_: found._replace(status=Status.STEP_LIMIT))
+    assert evaluator.evaluate(np.full(2, 0.5), gradient=False).status is Status.STEP_LIMIT
 
 
 def test_bodies_in_space_are_refused() -> None:
