@@ -384,6 +384,8 @@ class Evaluator:
         if result.status.ok:
             return Status.UNRESOLVED, driver.member(result.unresolved)
         status, steps = driver.simulate(design)
+        if status.ok:  # the motion alone; it was to be computed again with steps that integrals over time need
+            return result.status, "with the steps that integrals over time need"
         return driver.explain(design, status, float(steps.t[-1]), steps.q[-1], steps.v[-1])
 
     def _evaluation(

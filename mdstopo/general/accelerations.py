@@ -342,6 +342,24 @@ def solve_unknowns(model, workspace, a, lam):
 
 
 @kernel
+def apply_mass(model, workspace, x, out):
+    """out (n,) = M x, the matrix of mass with that of inerters.
+
+    model: the compiled scene.
+    workspace: the workspace, with the inertances of the balance.
+    x (n,): accelerations, or alike.
+    """
+    for d in range(x.shape[0]):
+        out[d] = model.mass[d] * x[d]
+    for p in range(model.pair.shape[0]):
+        for i in range(pair_freedoms(model)):
+            total = 0.0
+            for j in range(pair_freedoms(model)):
+                total += workspace.mass[p, i, j] * x[place_in_pair(model, p, j)]
+            out[place_in_pair(model, p, i)] += total
+
+
+@kernel
 def newton_correction(model, workspace, w_q, w_v, off, change, row):
     """What Newton's iteration adds to accelerations whose stage is implicit: W x = M off, Phi_q x = Phi_q off.
 
@@ -356,15 +374,8 @@ def newton_correction(model, workspace, w_q, w_v, off, change, row):
     Out:
       change (n,), row (n_row,): what is added to accelerations and multipliers; driven parts are 0.
     """
-    for d in range(off.shape[0]):
-        change[d] = model.mass[d] * off[d]
+    apply_mass(model, workspace, off, change)
     row[:] = 0.0
-    for p in range(model.pair.shape[0]):
-        for i in range(pair_freedoms(model)):
-            total = 0.0
-            for j in range(pair_freedoms(model)):
-                total += workspace.mass[p, i, j] * off[place_in_pair(model, p, j)]
-            change[place_in_pair(model, p, i)] += total
     for j in range(model.joint.shape[0]):
         for r in range(most_rows(model)):
             if model.row[j, r] >= 0:

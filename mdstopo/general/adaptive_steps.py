@@ -151,7 +151,7 @@ def advance(
       lam (n_row,): multipliers of the joints at the last stage.
       q (s or more, n_q), v, a (s or more, n): coordinates, velocities, accelerations of the stages.
       history: the history of steps (`StepHistory`), where stages are kept.
-      end_q (n_q,), end_v (n,): coordinates and velocities at the end.
+      end_q (n_q,), end_v (n,): coordinates and velocities at the end; NaN where a stage is not found.
       push (2, n_row): the multipliers of the projection there.
       work (WORK,): counts of work, added to.
 
@@ -162,6 +162,8 @@ def advance(
         tag, model, table, 0, s, member_state, segment, t, h, q0, v0, tangent, o, workspace, lam, q, v, a, history, work
     )
     if singular >= 0:
+        end_q[:] = np.nan
+        end_v[:] = np.nan
         return singular
     end_state(model, table, s, h, q0, v0, q, v, a, workspace.slopes, end_q, end_v)
     drive_state(model, segment, t + h, end_q, end_v)

@@ -15,8 +15,14 @@ and Shampine 1996):
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.general.accelerations import newton_correction, solve_accelerations, solve_unknowns, subtract_matrices
-from mdstopo.general.adaptive_steps import run_adaptive, scene_size
+from mdstopo.general.accelerations import (
+    apply_mass,
+    newton_correction,
+    solve_accelerations,
+    solve_unknowns,
+    subtract_matrices,
+)
+from mdstopo.general.adaptive_steps import ROUNDING, run_adaptive, scene_size
 from mdstopo.general.method_interface import UNSOLVED, implement
 from mdstopo.general.model import unpack_general
 from mdstopo.general.runge_kutta_sensitivity import COMMON
@@ -28,7 +34,8 @@ from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, moved
 
 TAG = (0, 0, 0, 0)
 #: Newton's iterations of a stage at most; the correction, relative to how far bodies move in the step, at which it
-#: ends; and the one from which on a correction that is no smaller than HALF the last is rounding
+#: ends; and the one from which on a correction that is no smaller than HALF the last is rounding, as is one that is
+#: below ROUNDING of the scene's size: where bodies have come to rest they move by less than rounding in a step
 MOST, CLOSELY, ROUNDED, HALF = 12, 1e-13, 1e-7, 0.5
 #: error of a step of the length tau, relative to the motion (`first_step`)
 FIRST_ERROR = 0.05
@@ -141,7 +148,8 @@ def solve_stage(model, table, i, member_state, segment, t, h, q0, workspace, lam
         moved = moved_most(model, shift, size)
         if not moved < np.inf:
             return UNSOLVED
-        if moved <= CLOSELY * reached or (moved <= ROUNDED * reached and moved >= HALF * before):
+        rounded = max(ROUNDED * reached, ROUNDING * size)
+        if moved <= CLOSELY * reached or (moved <= rounded and moved >= HALF * before):
             drive_state(model, segment, t, q, v)
             for r in range(lam.shape[0]):
                 lam[r] += row[r]
@@ -164,15 +172,15 @@ def damp_error(model, table, s, h, workspace, lam, a):
     n = a.shape[1]
     w_v = h * table[A, s - 1, s - 1]
     e_q = np.zeros(n)
+    e_v = np.zeros(n)
     y = np.empty(n)
     row = np.zeros(lam.shape[0])
     for d in range(n):
-        e_v = 0.0
         for j in range(s):
             e_q[d] += h * h * table[VECTORS, E_Q, j] * a[j, d]
-            e_v += h * table[VECTORS, E_V, j] * a[j, d]
-        y[d] = model.mass[d] * e_v
+            e_v[d] += h * table[VECTORS, E_V, j] * a[j, d]
         e_q[d] *= w_v
+    apply_mass(model, workspace, e_v, y)
     subtract_matrices(model, workspace.k, e_q, y)
     solve_unknowns(model, workspace, y, row)
     for d in range(n):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from mdstopo.case.model import Case
 from mdstopo.integrators.driver import MAX_STEPS
-from mdstopo.integrators.steps import ACCEPTED, HELD_SHORT
+from mdstopo.integrators.steps import ACCEPTED, HELD_SHORT, STEP_LIMIT
 from mdstopo.scene.model import FloatArray
 
 if TYPE_CHECKING:
@@ -29,10 +29,11 @@ def held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
     """In words that explicit steps of a design alpha (N,) are held short by stability; or nothing."""
     driver.allow(ENOUGH)
     try:
-        driver.run(alpha, False)
+        code, _, _ = driver.run(alpha, False)
     finally:
         driver.allow(MAX_STEPS)
     held, steps = int(driver.work[HELD_SHORT]), int(driver.work[ACCEPTED])
-    if held < MANY or held < MOST * steps:
+    hopeless = code == STEP_LIMIT and steps < ENOUGH  # held so short that the motion was given up before (`braking`)
+    if held < MOST * steps or not (hopeless or held >= MANY):
         return ""
     return f"stability holds {held} of {steps} explicit steps short, not accuracy"

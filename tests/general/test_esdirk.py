@@ -11,6 +11,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.integrators.esdirk_tables import STAGES, esdirk_tables
 from mdstopo.integrators.runge_kutta_tables import BB, E_Q, E_V, VECTORS, A, B, C
+from mdstopo.status import Status
 
 OWN = slice(STAGES)
 #: a double pendulum whose end is held by a damped spring
@@ -62,6 +63,21 @@ objectives:
   D: {response: {displacement: {body: a, component: x}}, over_time: max}
   V: {response: {velocity: {body: a, component: x}}, over_time: final}
 combine: {weights: {D: 1, V: 1}, normalize: false}
+"""
+#: a body that sinks onto two stiff and strongly damped springs, and then hangs there
+HANGING = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 20}
+bodies: {a: {mass: 2, inertia: 0.3, position: [0, 0]}}
+points:
+  top: {body: a, grid: {list: [[-0.3, 0], [0.3, 0]]}}
+  hooks: {body: ground, grid: {list: [[-0.3, 1], [0.3, 1]]}}
+members:
+  s: {from: top, to: hooks, connect: pairs, law: {type: spring, stiffness: 1e6, damping: 1e4}}
+design: {initial: 0.5}
+objectives: {G: {response: {displacement: {body: a, component: y}}, over_time: final}}
+solver: {integrator: esdirk, tolerance: 1e-5}
 """
 
 
@@ -147,6 +163,23 @@ def test_a_stop_and_friction_agree_with_the_explicit_method() -> None:
         assert other.gradients[name] == pytest.approx(found.gradients[name], rel=1e-8)
 
 
+def test_bodies_at_rest_on_stiff_springs_are_followed_in_long_steps() -> None:
+    """Newton's iteration ended as failed where bodies move by less than rounding in a step."""
+    case = read_case(HANGING)
+    found, (one, other) = mdstopo.evaluate(case), (0.5, 0.5)
+    height = -2.0 * 9.81 / (1e6 * (one + other))
+    assert found.status.ok
+    assert found.work["steps"] <= 300
+    assert found.objectives["G"] == pytest.approx(height, rel=1e-9)
+    assert found.gradients["G"] == pytest.approx(np.full(2, -height / (one + other)), rel=1e-6)
+
+
+def test_auto_takes_it_where_explicit_steps_have_no_hope_to_reach_the_end() -> None:
+    text = PENDULUM.replace("DAMPING", "5e4").replace("{end: 1}", "{end: 100}")
+    chosen = Evaluator(read_case(text, overrides={"solver.tolerance": 1e-5}), beside=False)
+    assert chosen.integrator == "esdirk"
+
+
 def test_auto_takes_it_where_stability_holds_most_explicit_steps_short() -> None:
     chosen = {damping: Evaluator(pendulum(damping, tolerance=1e-5), beside=False) for damping in (500.0, 5e4)}
     assert chosen[500.0].integrator == "runge_kutta"
@@ -155,6 +188,15 @@ def test_auto_takes_it_where_stability_holds_most_explicit_steps_short() -> None
     start = np.full(2, 0.5)
     assert chosen[5e4].evaluate(start).work["steps"] <= 1500
     assert chosen[500.0].evaluate(start).work["steps_held_short"] > 100
+
+
+def test_steps_for_integrals_that_are_too_many_end_with_a_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The motion alone may be computed: it was taken for all, and no value was found."""
+    evaluator = Evaluator(pendulum(500.0, integrator="esdirk", tolerance=1e-4), beside=False)
+    driver = evaluator.driver(next(iter(evaluator.scenes)))
+    found = driver.evaluate(np.full(2, 0.5), False)
+    monkeypatch.setattr(driver, "evaluate", lambda *_: found._replace(status=Status.STEP_LIMIT))
+    assert evaluator.evaluate(np.full(2, 0.5), gradient=False).status is Status.STEP_LIMIT
 
 
 def test_bodies_in_space_are_refused() -> None:
