@@ -77,7 +77,7 @@ def make_stages(
             work[FORCES] += 1
             work[TANGENTS] += 1
         else:
-            singular = solve_stage(
+            singular = find_stage(
                 model, table, i, member_state, segment, time, h, q0, workspace, lam, q[i], v[i], a, work
             )
         if singular >= 0:
@@ -89,7 +89,7 @@ def make_stages(
 
 
 @kernel
-def solve_stage(model, table, i, member_state, segment, t, h, q0, workspace, lam, q, v, a, work):
+def find_stage(model, table, i, member_state, segment, t, h, q0, workspace, lam, q, v, a, work):
     """Find the accelerations of an implicit stage.
 
     Constant:
@@ -165,7 +165,7 @@ def damp_error(model, table, s, h, workspace, lam, a):
     model: the compiled scene.
     table (3, 17, 17): coefficients of the method.
     s, h: number of stages, and length of the step (s).
-    workspace: workspace of a balance, as `solve_stage` has left it of the last stage.
+    workspace: workspace of a balance, as `find_stage` has left it of the last stage.
     lam (n_row,): multipliers; only their number is read.
     a (17, n): accelerations of the stages.
     """

@@ -293,7 +293,7 @@ def moved_most(model, q, size):
 
 
 def stage_state(model, table, h, i, q0, v0, q, v, a, slopes):
-    """Coordinates and velocities of a stage of an explicit Runge-Kutta step.
+    """Coordinates and velocities of a stage of a Runge-Kutta step, from the stages before it.
 
     In:
       model: the compiled scene.
