@@ -327,22 +327,25 @@ class Evaluator:
     @cached_property
     def _choice(self) -> tuple[str, str]:
         """The integrator, and why; where `auto` would take explicit steps, their motions from the case's start tell."""
-        name, reason = self._usual
+        usual = self._usual
         chooses = self.case.solver.integrator == AUTO and self.case.solver.step is None
-        if not chooses or name != ADAPTIVE or self.case.dimension > 2:
-            return name, reason
-        from mdstopo.general.stiffness import held_short, may_be_stiff
+        if not chooses or usual[0] != ADAPTIVE or self.case.dimension > 2:
+            return usual
+        from mdstopo.general.stiffness import held_short
+        from mdstopo.general.variables import has_damping
 
-        if not may_be_stiff(self.case):
-            return name, reason
+        if not has_damping(self.case):
+            return usual
         explicit = method_of(ADAPTIVE, self.case.solver)
-        drivers = {scene: self._made(scene, explicit) for scene, looked in self._by_load_case.items() if looked}
+        drivers = {
+            load_case: self._made(load_case, explicit) for load_case, looked in self._by_load_case.items() if looked
+        }
         for driver in drivers.values():
             held = held_short(cast("GeneralDriver", driver), self._design.take(self.case.start))
             if held:
                 return STIFF, held
         self._drivers.update(drivers)
-        return name, reason
+        return usual
 
     def driver(self, name: str) -> SceneDriver:
         """The buffers and compiled entries of one load case, made at their first use."""

@@ -21,6 +21,7 @@ from mdstopo.general.variables import (
     along,
     as_computed,
     each_member,
+    has_damping,
     lasting_times,
     varied,
     watched_times,
@@ -375,14 +376,12 @@ def _responses(
 
 def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, ...]) -> bool:
     """Whether anything depends on velocity: then the steps' stages need velocities that are right."""
-    forces = any(law.depends_on_rate for group in case.members for law in group.laws)
-    bushed = any(any(bushing.damping) for bushing in case.bushings)
     looks = any(
         over_time in ("mean", "rms", "integral") and kind_of(each).depends_on_rate
         for response, over_time in zip(responses, reductions, strict=True)
         for each in response.looked
     )
-    return forces or adds_damping(case) or bushed or looks or bool(case.joints) or bool(case.contacts)
+    return has_damping(case) or adds_damping(case) or looks or bool(case.joints)
 
 
 def _switches(case: Case) -> bool:

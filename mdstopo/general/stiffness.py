@@ -7,7 +7,6 @@ steps and for many, implicit ones are fewer by more than each costs.
 
 from typing import TYPE_CHECKING
 
-from mdstopo.case.model import Case
 from mdstopo.integrators.driver import MAX_STEPS
 from mdstopo.integrators.steps import ACCEPTED, HELD_SHORT, STEP_LIMIT
 from mdstopo.scene.model import FloatArray
@@ -17,12 +16,6 @@ if TYPE_CHECKING:
 
 #: steps of a motion that have to be held short, and their share, before implicit ones pay; steps that tell enough
 MANY, MOST, ENOUGH = 4000, 0.5, 8000
-
-
-def may_be_stiff(case: Case) -> bool:
-    """Whether forces depend on rates by themselves: else nothing damps, and nothing is looked at."""
-    forces = any(law.depends_on_rate for group in case.members for law in group.laws)
-    return forces or bool(case.contacts) or any(any(bushing.damping) for bushing in case.bushings)
 
 
 def held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:

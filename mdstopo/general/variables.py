@@ -51,6 +51,12 @@ def watched_times(case: Case, load_case: LoadCase) -> list[float]:
     return times
 
 
+def has_damping(case: Case) -> bool:
+    """Whether forces of members, bushings or contacts depend on velocities, as the case states them."""
+    forces = any(law.depends_on_rate for group in case.members for law in group.laws)
+    return forces or bool(case.contacts) or any(any(bushing.damping) for bushing in case.bushings)
+
+
 def adds_damping(case: Case) -> bool:
     """Whether a force may depend on velocities or accelerations by a parameter that varies."""
     groups = {group.name: group for group in case.members}
