@@ -10,23 +10,23 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.braking import HELD, HOPELESS, brake_rate, friction_error
+from mdstopo.general.event_log import CHATTER, log_at_breakpoint, log_switches
 from mdstopo.general.events import (
     has_switches,
     is_doubtful,
     room_for_watched,
     smallest_margin,
-    switch_any,
-    watch_all,
     watch_near,
 )
-from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
+from mdstopo.general.first_step import first_step, motion_scale
 from mdstopo.general.landing import CORRECTIONS, first_event, landing_of
 from mdstopo.general.locate import AIM
 from mdstopo.general.locate import NEAR as NEAR_SWITCH
-from mdstopo.general.members import MODE, SET, meeting, scale_general, set_modes
+from mdstopo.general.members import MODE, SET, meeting, scale_general
 from mdstopo.general.method_interface import UNSOLVED, is_explicit, make_stages, scheme, step_error
 from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.projection import project
+from mdstopo.general.run_start import ROUNDING, log_start, motion_at_start, scene_size, start_modes
 from mdstopo.general.singular_poses import (
     CLOSE,
     NEAR,
@@ -39,21 +39,11 @@ from mdstopo.general.singular_poses import (
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,
-    GIVEN,
-    GRAZES,
-    MEMBER,
-    NEW,
-    OLD,
     PARENT,
     SEGMENT,
-    SET_AFTER,
-    SET_BEFORE,
-    STATE,
-    TIME_BY_SET,
     copy_vector,
     keep_state,
 )
-from mdstopo.general.strides import energy_column
 from mdstopo.integrators.runge_kutta import MOST
 from mdstopo.integrators.runge_kutta_tables import INSIDE
 from mdstopo.integrators.steps import (
@@ -81,12 +71,8 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     deflection,
     drive_state,
     end_state,
-    freedoms,
-    home_extent,
     largest_turn,
     motion_weights,
-    pair_stiffness,
-    pose_acceleration,
     pose_size,
     relative_pose,
 )
@@ -99,10 +85,6 @@ MARGIN, LOOSE, SLACK = 0.02, 1e-5, 1.0 / 3.0
 #: a step that may grow does so by this power of what the order allows: where steps are long the estimate rises faster
 #: than the order says, and a step that is rejected costs more than one that could have been longer
 GROWTH = 2.0 / 3.0
-#: what rounding leaves of a margin, relative to the scene's size
-ROUNDING = 4e-15
-#: events within a millionth of the simulated time after which the scene counts as chattering
-CHATTER = 400
 
 
 @kernel
@@ -168,123 +150,6 @@ def advance(
     end_state(model, table, s, h, q0, v0, q, v, a, workspace.slopes, end_q, end_v)
     drive_state(model, segment, t + h, end_q, end_v)
     return project(model, size, end_q, end_v, workspace, push[0], push[1])
-
-
-@kernel
-def scene_size(model):
-    """A length of the scene, m: what rounding of positions is measured against."""
-    size = 0.0
-    for p in range(model.reach.shape[0]):
-        size = max(size, model.reach[p])
-    size = max(size, home_extent(model))
-    return size if size > 0.0 else 1.0
-
-
-@kernel
-def start_modes(model, member_state, workspace, q, v, a, lam, knots):
-    """Set the modes and permanent sets at the start: by elongation, then by its rate, then by its second derivative.
-
-    The last is that of a balance with the modes that elongations and rates tell.
-
-    Constant:
-      model: the compiled scene.
-      knots: whether each piece of a curve is a mode (`members.set_modes`).
-    In place:
-      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      q (n_q,), v (n,): the start; driven parts are put in place.
-    Out:
-      workspace: workspace of a balance (`accelerations.Workspace`).
-      a (n,), lam (n_row,): accelerations and multipliers of that balance.
-
-    Returns the place of an unknown at which the joints are singular, or -1.
-    """
-    n_pair = model.pair.shape[0]
-    rel = np.empty((n_pair, pose_size(model)))
-    second = np.zeros((n_pair, freedoms(model)))
-    relative_pose(model, q, v, rel)
-    for attempt in range(2):
-        set_modes(model, member_state, rel, second, knots)
-        if attempt == 0:
-            singular = solve_accelerations(
-                model, member_state, np.int64(0), model.times[0], q, v, np.bool_(False), workspace, a, lam
-            )
-            if singular >= 0:
-                return singular
-            for p in range(n_pair):
-                pose_acceleration(model, rel, p, a, second[p])
-    return -1
-
-
-@kernel
-def log_switches(
-    model, member_state, segment, t, q, v, watched, workspace, a, lam, history, state, events, graze, noise, work, where
-):
-    """Switch every member whose margin is used up, one after the other, and note each as an event.
-
-    The loop ends because each member switches at most twice here.
-
-    Constant:
-      model: the compiled scene.
-    In:
-      segment: number of the stretch of time between two breakpoints.
-      t: time (s).
-      q (n_q,), v (n,): coordinates and velocities.
-      watched: the members and contacts that may switch (`events.watch_near`).
-      state: number of the state at which this happens.
-      events: how many events there have been.
-      graze: a member whose margin would fall below zero by less than this only grazes (m).
-      noise: margins that are below zero by no more than this are rounding.
-    In place:
-      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      a (n,): accelerations before the first event, then behind the last one.
-      history: the history of steps (`StepHistory`), which takes the events.
-      where (3,): where[2] becomes a member that grazes so that the motion has no derivative.
-    Out:
-      workspace: workspace of a balance (`accelerations.Workspace`).
-      lam (n_row,): multipliers of the joints behind the last event.
-      work (WORK,): counts of work, added to.
-
-    Returns how many events there are now; -1: there is no room for them.
-    """
-    n = v.shape[0]
-    n_pair = model.pair.shape[0]
-    rel = np.empty((n_pair, pose_size(model)))
-    relative_pose(model, q, v, rel)
-    done = 0
-    while True:
-        margin, who = smallest_margin(model, t, member_state, rel, watched)
-        if not margin < -noise or done > 2 * member_state.shape[1]:
-            return events
-        if events >= history.event.shape[0]:
-            return -1
-        saltation = history.saltation[events]
-        new, beyond, kind, by_set, grown = switch_any(model, segment, t, member_state, rel, q, v, a, who, saltation)
-        old = int(member_state[MODE, who])
-        if beyond < graze and kind == 2:
-            where[2] = who
-        history.event[events, STATE] = state
-        history.event[events, MEMBER] = who
-        history.event[events, OLD] = old
-        history.event[events, NEW] = new
-        history.event[events, GRAZES] = 1 if beyond < graze and kind > 0 else 0
-        history.event[events, GIVEN] = 0
-        history.kept[events, SET_BEFORE] = member_state[SET, who]
-        member_state[SET, who] += grown
-        history.kept[events, SET_AFTER] = member_state[SET, who]
-        history.kept[events, TIME_BY_SET] = by_set
-        member_state[MODE, who] = new
-        events += 1
-        member_state[MODE, member_state.shape[1] - 1] = events
-        done += 1
-        for d in range(n):
-            saltation[2, d] = a[d]
-        solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
-        work[FORCES] += 1
-        work[OF_STARTS] += 1
-        for d in range(n):
-            saltation[2, d] -= a[d]
-        if new == old:
-            return events
 
 
 @kernel
@@ -433,34 +298,13 @@ def run_adaptive(
     motion = np.zeros(n_pair)
     noise = np.empty(n_pair)
     scale = np.empty(n_pair)
+    motion_at_start(model, member_state, workspace, rel0, v0, scale, motion, noise)
     shaken = 0.0
     for p in range(n_pair):
-        scale[p] = pair_stiffness(model, workspace.sums, p)
-        energy = workspace.sums[p, energy_column(model)]
-        if energy > 0.0 and scale[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * energy / scale[p])  # members of the pair store energy at the start
-    rounding_at_start(model, member_state, rel0, v0, scale, motion, noise)
-    for p in range(n_pair):
         shaken += abs(scale[p]) * noise[p]
-    # the modes at the start, to which events lead back (`restore_modes`), are events of state 0
-    events = np.int64(0)
-    if switching:
-        for i in range(member_state.shape[1] - 1):
-            if member_state[MODE, i] != 0.0:
-                if events >= history.event.shape[0]:
-                    return NEEDS_ROOM, 0, 0, t
-                history.event[events, STATE] = 0
-                history.event[events, MEMBER] = i
-                history.event[events, OLD] = 0
-                history.event[events, NEW] = int(member_state[MODE, i])
-                history.event[events, GRAZES] = 0
-                history.event[events, GIVEN] = 1
-                history.kept[events, SET_BEFORE] = 0.0
-                history.kept[events, SET_AFTER] = member_state[SET, i]
-                history.kept[events, TIME_BY_SET] = 0.0
-                history.saltation[events] = 0.0
-                events += 1
-        member_state[MODE, member_state.shape[1] - 1] = events
+    events = log_start(member_state, history) if switching else np.int64(0)
+    if events < 0:
+        return NEEDS_ROOM, 0, 0, t
     last_time = times[times.shape[0] - 1]
     span = last_time - t
     wanted = fixed_step
@@ -485,22 +329,14 @@ def run_adaptive(
             drive_state(model, segment, t, q0, v0)
             keep_state(history, count, t, q0, v0, history.push[count, 0], history.push[count, 1])
             if switching:
-                # a member whose law begins to act at this time may be on either side of its switch
-                watch_all(model, segment, watched)
-                solve_accelerations(model, member_state, segment, t, q0, v0, no, workspace, a0, lam)
                 work[FORCES] += 1
                 work[OF_STARTS] += 1
-                first = events
-                events = log_switches(
-                    model, member_state, segment, t, q0, v0, watched, workspace, a0, lam, history, count, events, -1.0,
+                events = log_at_breakpoint(
+                    model, member_state, segment, t, q0, v0, watched, workspace, a0, lam, history, count, events,
                     rounding, work, where,
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
-                for e in range(first, events):
-                    history.saltation[e] = 0.0  # the time is given: it does not vary with the design
-                    history.kept[e, TIME_BY_SET] = 0.0
-                    history.event[e, GIVEN] = 1
         while t < end:
             where[0] = -1
             damped = max(decay, brake) if fast > 1 else brake

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace
-from mdstopo.general.first_step import motion_scale, rounding_at_start
+from mdstopo.general.first_step import motion_scale
 from mdstopo.general.gauss_window import (
     COUNTS,
     MOST,
@@ -29,8 +29,8 @@ from mdstopo.general.generalized_alpha_step import rate_of
 from mdstopo.general.members import MODE, SET, meeting, scale_general
 from mdstopo.general.model import KIND, unpack_general
 from mdstopo.general.responses import ENERGY
+from mdstopo.general.run_start import motion_at_start
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, copy_vector, keep_state
-from mdstopo.general.strides import energy_column
 from mdstopo.integrators.driver import LOOSE_NEWTON, NEWTON_TOLERANCE
 from mdstopo.integrators.gauss import FIRST_LEVEL, LONGEST, caution
 from mdstopo.integrators.rows import integrate_to_nodes, take_rows
@@ -53,7 +53,6 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     drive_state,
     freedoms,
     motion_weights,
-    pair_stiffness,
     pose_size,
     relative_pose,
     rotations,
@@ -277,12 +276,7 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     begin_nodes(model, v0, nodes)
     balance_at(model, member_state, np.int64(0), t, np.int64(0), q0, rel0, workspace, history, np.int64(0), nodes, work)
     balanced = is_steady(model, np.int64(0))  # whether node 0 has the balance that the next prediction begins with
-    for p in range(n_pair):
-        scale[p] = pair_stiffness(model, workspace.sums, p)
-        energy = workspace.sums[p, energy_column(model)]
-        if energy > 0.0 and scale[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * energy / scale[p])  # members of the pair store energy at the start
-    rounding_at_start(model, member_state, rel0, v0, scale, motion, noise)
+    motion_at_start(model, member_state, workspace, rel0, v0, scale, motion, noise)
     last_time = times[times.shape[0] - 1]
     span = last_time - t
     wanted = fixed_step

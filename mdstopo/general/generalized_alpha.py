@@ -15,9 +15,8 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.adaptive_steps import CHATTER, ROUNDING, log_switches, scene_size, start_modes
+from mdstopo.general.event_log import CHATTER, log_at_breakpoint, log_switches
 from mdstopo.general.events import first_sign, has_switches, room_for_watched, smallest_margin, watch_all
-from mdstopo.general.first_step import rounding_at_start
 from mdstopo.general.generalized_alpha_step import AUXILIARY, VELOCITY, advance, rate_of
 from mdstopo.general.locate import (
     CUTS,
@@ -33,25 +32,16 @@ from mdstopo.general.locate import (
 from mdstopo.general.members import MODE, SET, meeting, scale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
+from mdstopo.general.run_start import ROUNDING, log_start, motion_at_start, scene_size, start_modes
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,
-    GIVEN,
-    GRAZES,
-    MEMBER,
-    NEW,
-    OLD,
     PARENT,
     SEGMENT,
-    SET_AFTER,
-    SET_BEFORE,
-    STATE,
-    TIME_BY_SET,
     carve_history,
     copy_vector,
     keep_state,
 )
-from mdstopo.general.strides import energy_column
 from mdstopo.integrators.generalized_alpha import FEWEST
 from mdstopo.integrators.steps import (
     ACCEPTED,
@@ -67,7 +57,6 @@ from mdstopo.integrators.steps import (
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     deflection,
     drive_state,
-    pair_stiffness,
     pose_size,
     relative_pose,
 )
@@ -164,35 +153,15 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     motion = extent[0]
     noise = extent[1]
     stiffness = np.empty(n_pair)
-    for p in range(n_pair):
-        stiffness[p] = pair_stiffness(model, workspace.sums, p)
-        energy = workspace.sums[p, energy_column(model)]
-        if energy > 0.0 and stiffness[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * energy / stiffness[p])
-    rounding_at_start(model, member_state, rel0, v, stiffness, motion, noise)
+    motion_at_start(model, member_state, workspace, rel0, v, stiffness, motion, noise)
     span = times[times.shape[0] - 1] - t
     step = settings[2]
     if not step > 0.0:
         rate = rate_of(model, workspace)
         step = min(-step / rate, span / FEWEST) if rate > 0.0 else span / FEWEST
-    events = np.int64(0)
-    if switching:
-        for i in range(member_state.shape[1] - 1):
-            if member_state[MODE, i] != 0.0:
-                if events >= history.event.shape[0]:
-                    return NEEDS_ROOM, 0, 0, t
-                history.event[events, STATE] = 0
-                history.event[events, MEMBER] = i
-                history.event[events, OLD] = 0
-                history.event[events, NEW] = int(member_state[MODE, i])
-                history.event[events, GRAZES] = 0
-                history.event[events, GIVEN] = 1
-                history.kept[events, SET_BEFORE] = 0.0
-                history.kept[events, SET_AFTER] = member_state[SET, i]
-                history.kept[events, TIME_BY_SET] = 0.0
-                history.saltation[events] = 0.0
-                events += 1
-        member_state[MODE, member_state.shape[1] - 1] = events
+    events = log_start(member_state, history) if switching else np.int64(0)
+    if events < 0:
+        return NEEDS_ROOM, 0, 0, t
     keep_state(history, 0, t, q, v, push[0], push[1])
     history.index[0, FIRST] = 0
     count = np.int64(0)
@@ -205,19 +174,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             drive_state(model, segment, t, q, v)
             keep_state(history, count, t, q, v, history.push[count, 0], history.push[count, 1])
             if switching:
-                watch_all(model, segment, watched)
-                solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a0, lam)
-                first = events
-                events = log_switches(
-                    model, member_state, segment, t, q, v, watched, workspace, a0, lam, history, count, events, -1.0,
+                events = log_at_breakpoint(
+                    model, member_state, segment, t, q, v, watched, workspace, a0, lam, history, count, events,
                     rounding, work, where,
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
-                for e in range(first, events):
-                    history.saltation[e] = 0.0
-                    history.kept[e, TIME_BY_SET] = 0.0
-                    history.event[e, GIVEN] = 1
         begin = t
         pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
         done = 0.0
@@ -253,7 +215,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 copy_rows(ends, beyond[0])
                 copy_vector(q, left_q)
                 copy_vector(v, left_v)
-                while top >= 0:  # as `runge_kutta.simulate` does
+                while top >= 0:  # as `landing.first_piece` does
                     relative_pose(model, left_q, left_v, before)
                     relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
                     dip, near = first_sign(

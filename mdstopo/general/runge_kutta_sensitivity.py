@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.adaptive_steps import advance, scene_size
+from mdstopo.general.adaptive_steps import advance
 from mdstopo.general.method_interface import implement, scheme
+from mdstopo.general.run_start import scene_size
 from mdstopo.general.runge_kutta import TAG
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, keep_state, restore_modes
 from mdstopo.general.step_inside import table_of_step

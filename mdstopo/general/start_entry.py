@@ -4,10 +4,10 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import joint_state, make_workspace, solve_accelerations
-from mdstopo.general.adaptive_steps import scene_size, start_modes
 from mdstopo.general.members import scale_general
 from mdstopo.general.model import JOINT_ROWS, unpack_general
 from mdstopo.general.projection import project
+from mdstopo.general.run_start import scene_size, start_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair, place_of_turn
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, rotations, turn_bodies
 

@@ -45,29 +45,7 @@ def make_stages(
     history,
     work,
 ):
-    """Make the balances of some explicit stages of a step.
-
-    Constant:
-      tag: the method of integration (`method_interface`).
-      model: the compiled scene.
-      table (3, 17, 17): coefficients of the method (`integrators.runge_kutta_tables`).
-      first, stop: numbers of the first stage to be made, and of the one behind the last.
-    In:
-      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      segment: number of the stretch of time between two breakpoints.
-      t, h: time at the start, and length of the step (s).
-      q0 (n_q,), v0 (n,): coordinates and velocities at the start.
-      tangent: whether the tangents of the stages are wanted.
-      o: number in `history` of the step's stage 0; -1: stages are not kept.
-    Out:
-      workspace: workspace of a balance (`accelerations.Workspace`).
-      lam (n_row,): multipliers of the joints at the last stage.
-      q (stop or more, n_q), v, a (stop or more, n): coordinates, velocities, accelerations of the stages.
-      history: the history of steps (`StepHistory`), where stages are kept.
-      work (WORK,): counts of work, added to.
-
-    Returns -1, or the place of an unknown at which the joints are singular.
-    """
+    """Make the balances of some explicit stages of a step; see `method_interface.make_stages`."""
     workspace.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
     workspace.switches[APART] = 1 if has_factors(history) else 0
     singular = -1
