@@ -174,18 +174,21 @@ def advance_to_switch(
       end_q (n_q,), end_v (n,), push (2, n_row): the end of the step, and the multipliers of its projection.
       work (WORK,): counts of work, added to.
 
-    Returns the length (s), and whether a margin is used up at its end.
+    Returns the length (s), whether a margin is used up at its end, and what `advance` returns of it.
     """
     length = c * h
     before = 0.0
     at_before = 0.0
     value = 0.0
+    singular = -1
     for tries in range(CORRECTIONS):
-        advance(
+        singular = advance(
             tag, step.model, table, s, step.member_state, segment, t, length, step.q0, step.v0, tangent, o,
             step.workspace, lam, step.q, step.v, step.a, history, end_q, end_v, push, step.size, work,
         )  # fmt: skip
         work[OF_SWITCHES] += s if tries > 0 else 0
+        if singular >= 0:
+            break
         relative_pose(step.model, end_q, end_v, step.rel)
         value, _ = smallest_margin(step.model, t + length, step.member_state, step.rel, step.watched)
         near = value < -rounding and (value >= -NEAR_SWITCH * rounding or tries >= CORRECTIONS // 2)
@@ -197,7 +200,7 @@ def advance_to_switch(
         at_before = value
         shift = -(value + AIM * rounding) / rate if rate < 0.0 else 4e-16 * (abs(t) + h) * 4.0**tries
         length = min(max(length + shift, 0.5 * length), h)
-    return length, value < -rounding
+    return length, value < -rounding, singular
 
 
 @kernel
@@ -456,10 +459,16 @@ def run_adaptive(
                 happens = c <= 1.0
                 if happens and (settings[4] != 0.0 or not explicit):
                     work[OF_SWITCHES] += s
-                    h, happens = advance_to_switch(
+                    h, happens, singular = advance_to_switch(
                         tag, step, table, s, segment, t, h, c, rate, rounding, keep, stages, lam, history, end_q, end_v,
                         push, work,
                     )  # fmt: skip
+                    if singular >= 0:
+                        wanted = 0.25 * h
+                        must = False
+                        work[REJECTED] += 1
+                        work[OF_REJECTED] += s
+                        continue
                 elif happens:
                     own = INSIDE
                     history.share[count] = c
