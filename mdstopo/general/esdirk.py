@@ -22,15 +22,22 @@ from mdstopo.general.accelerations import (
     solve_unknowns,
     subtract_matrices,
 )
-from mdstopo.general.adaptive_steps import ROUNDING, run_adaptive, scene_size
+from mdstopo.general.adaptive_steps import run_adaptive
 from mdstopo.general.method_interface import UNSOLVED, implement
 from mdstopo.general.model import unpack_general
+from mdstopo.general.run_start import ROUNDING, scene_size
 from mdstopo.general.runge_kutta_sensitivity import COMMON
 from mdstopo.general.step_history import carve_history, copy_vector, keep_stage
 from mdstopo.integrators.esdirk_tables import ORDER, STAGES
 from mdstopo.integrators.runge_kutta_tables import AA, E_Q, E_V, VECTORS, A, C
 from mdstopo.integrators.steps import FORCES, NEWTON, TANGENTS, lasting
-from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, moved_most, shift_further, stage_state
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    difference,
+    drive_state,
+    moved_most,
+    shift_further,
+    stage_state,
+)
 
 TAG = (0, 0, 0, 0)
 #: Newton's iterations of a stage at most; the correction, relative to how far bodies move in the step, at which it
@@ -84,7 +91,7 @@ def make_stages(
             return singular
         if o >= 0:
             keep_stage(history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
-    damp_error(model, table, stop, h, workspace, lam, a)
+    damp_error(model, table, stop, h, workspace, a)
     return singular
 
 
@@ -142,7 +149,7 @@ def find_stage(model, table, i, member_state, segment, t, h, q0, workspace, lam,
             shift[d] = w_q * change[d]
             now[d] += change[d]
             v[d] += w_v * change[d]
-            off[d] = q[d] - q0[d]
+        difference(model, q, q0, off)
         shift_further(model, q0, shift, shift, q)
         reached = moved_most(model, off, size)
         moved = moved_most(model, shift, size)
@@ -159,14 +166,13 @@ def find_stage(model, table, i, member_state, segment, t, h, q0, workspace, lam,
 
 
 @kernel
-def damp_error(model, table, s, h, workspace, lam, a):
+def damp_error(model, table, s, h, workspace, a):
     """The estimated error of a step, damped, in rows s and s + 1 of a: of positions by h^2, of velocities by h.
 
     model: the compiled scene.
     table (3, 17, 17): coefficients of the method.
     s, h: number of stages, and length of the step (s).
     workspace: workspace of a balance, as `find_stage` has left it of the last stage.
-    lam (n_row,): multipliers; only their number is read.
     a (17, n): accelerations of the stages.
     """
     n = a.shape[1]
@@ -174,7 +180,7 @@ def damp_error(model, table, s, h, workspace, lam, a):
     e_q = np.zeros(n)
     e_v = np.zeros(n)
     y = np.empty(n)
-    row = np.zeros(lam.shape[0])
+    row = np.zeros(model.size[0])
     for d in range(n):
         for j in range(s):
             e_q[d] += h * h * table[VECTORS, E_Q, j] * a[j, d]
