@@ -49,10 +49,9 @@ from mdstopo.integrators.runge_kutta_tables import INSIDE
 from mdstopo.integrators.steps import (
     ACCEPTED,
     CHATTERING,
-    DAMPED,
-    FAST,
     FORCES,
     HELD_SHORT,
+    LIMITED,
     NEEDS_ROOM,
     NEWTON_FAILED,
     NON_FINITE,
@@ -62,6 +61,7 @@ from mdstopo.integrators.steps import (
     OK,
     REJECTED,
     SINGULAR,
+    STABLE,
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TURN,
@@ -276,7 +276,7 @@ def run_adaptive(
     braking = -1  # the contact that brakes most
     held = 0  # steps in a row that were kept short by the rate of contacts or dampers
     decay = 0.0  # the rate at which dampers damp, as the last step tells
-    fast = 0  # steps in a row that were as long as stability allows by it
+    limited = 0  # steps in a row that were as long as stability allows by it
     ended = 0.0  # length of the last step, if its last stage and the next step's first tell that rate
     moving = model.mass * model.free
     measures = explicit and method == 1 and not fixed_step > 0.0
@@ -317,7 +317,7 @@ def run_adaptive(
             lam, q[0], v[0], a[0], work,
         )  # fmt: skip
     if rubbing and not fixed_step > 0.0:
-        brake, braking = brake_rate(model, member_state, q0, v0, DAMPED / wanted, workspace)
+        brake, braking = brake_rate(model, member_state, q0, v0, STABLE / wanted, workspace)
     keep_state(history, 0, t, q0, v0, push[0], push[1])
     history.index[0, FIRST] = 0
     count = np.int64(0)
@@ -342,10 +342,10 @@ def run_adaptive(
                     return NEEDS_ROOM, count, 0, t
         while t < end:
             where[0] = -1
-            damped = max(decay, brake) if fast > 1 else brake
-            held = held + 1 if wanted * damped > DAMPED else 0
+            fastest = max(decay, brake) if limited > 1 else brake
+            held = held + 1 if wanted * fastest > STABLE else 0
             if held > 0:
-                wanted = DAMPED / damped
+                wanted = STABLE / fastest
                 where[0] = braking
                 work[HELD_SHORT] += 1
                 if held > HELD and (last_time - t) > HOPELESS * wanted * limits[0]:
@@ -383,7 +383,7 @@ def run_adaptive(
                     moving, history.stage_a[stages], history.stage_a[stages - 1], history.stage_v[stages],
                     history.stage_v[stages - 1],
                 )  # fmt: skip
-                fast = fast + 1 if ended * decay > FAST else 0
+                limited = limited + 1 if ended * decay > LIMITED else 0
                 ended = 0.0
             sigma_end = least_singular_value(model, workspace)
             relative_pose(model, end_q, end_v, rel)
@@ -521,6 +521,6 @@ def run_adaptive(
                     where[0] = who
                     return CHATTERING, count, events, t
             if rubbing and not fixed_step > 0.0:
-                brake, braking = brake_rate(model, member_state, q0, v0, DAMPED / wanted, workspace)
+                brake, braking = brake_rate(model, member_state, q0, v0, STABLE / wanted, workspace)
             history.index[count, EVENTS] = events
     return OK, count, events, t

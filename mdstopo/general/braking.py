@@ -19,7 +19,7 @@ from mdstopo.mechanics.kinematics.vectors import cross, dot, minus, norm
 SETTLED = 0.1
 #: what rounding leaves of a velocity, relative to its parts
 ROUNDING = 1e-15
-#: after HELD steps in a row that are held short by stability (`integrators.steps.DAMPED`), a motion is given up if at
+#: after HELD steps in a row that are held short by stability (`integrators.steps.STABLE`), a motion is given up if at
 #: this length it needs more than HOPELESS times the steps that it may take
 HELD, HOPELESS = 1000, 10.0
 

@@ -14,18 +14,18 @@ from mdstopo.compiler.jit import entry, kernel
 from mdstopo.integrators.runge_kutta_tables import BB, E2_Q, E2_V, E_Q, E_V, ORDERS, STAGES, B, C
 from mdstopo.integrators.steps import (
     ACCEPTED,
-    DAMPED,
-    FAST,
     FIELDS,
     FIRST,
     FORCES,
     HELD_SHORT,
+    LIMITED,
     NEEDS_ROOM,
     NON_FINITE,
     OK,
     PARENT,
     REJECTED,
     SEGMENT,
+    STABLE,
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
@@ -273,7 +273,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     last_v = np.zeros(n)
     last_a = np.zeros(n)
     decay = 0.0  # the rate at which dampers damp, as the last step tells
-    fast = 0  # steps in a row that were as long as stability allows by it
+    limited = 0  # steps in a row that were as long as stability allows by it
     ended = 0.0  # length of the last step, if its last stage and the next step's first tell a rate (`decay_rate`)
     steps.index[0, FIRST] = 0
     count = 0
@@ -298,7 +298,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             )  # fmt: skip
             if ended > 0.0:
                 decay = decay_rate(moving, a[0], last_a, v[0], last_v)
-                fast = fast + 1 if ended * decay > FAST else 0
+                limited = limited + 1 if ended * decay > LIMITED else 0
                 ended = 0.0
             widest = 0.0
             for p in range(n_pair):
@@ -326,8 +326,8 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
                 turned = largest_turn(pair, q0, ends[0])
                 wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
-                if fast > 1 and wanted * decay > DAMPED:
-                    wanted = DAMPED / decay
+                if limited > 1 and wanted * decay > STABLE:
+                    wanted = STABLE / decay
                     work[HELD_SHORT] += 1
                 if error > tolerance or turned > 1.1 * TURN:
                     work[REJECTED] += 1

@@ -74,8 +74,8 @@ def work_named(counts: Sequence[int]) -> dict[str, int]:
 
 #: a step that is longer than so many times what dampers take to damp is held short by stability, not by accuracy; the
 #: explicit method of order 8 does not damp at 6.4 any more. What a motion at rest never shows, its derivatives do,
-#: which then grow from step to step beyond all bounds. At DAMPED, the most that is allowed, all is damped to 0.06
-FAST, DAMPED = 4.0, 5.0
+#: which then grow from step to step beyond all bounds. At STABLE, the most that is allowed, all is damped to 0.06
+LIMITED, STABLE = 4.0, 5.0
 #: velocities at the end of a step closer than this to those of its last stage, relative, tell no rate
 TELLING = 1e-13
 WORK_NAMES = tuple(work_named(range(WORK)))
