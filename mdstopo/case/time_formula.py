@@ -6,14 +6,14 @@ import re
 from typing import Any
 
 from mdstopo.case.arrays import TimeFormula
-from mdstopo.case.formula_keys import TIME, FormulaNames, FormulaText
+from mdstopo.case.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.kinds import NUMBER
 from mdstopo.case.nodes import MAPPING, Node
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import ByShape, Key, ListOf, Record
 from mdstopo.case.words import inside
 from mdstopo.formula.errors import FormulaError
-from mdstopo.formula.parser import parse
+from mdstopo.formula.parser import TIME, parse
 
 #: a number, and behind it an operator or nothing
 _BEGINS = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(?:[-+*/^(),<>=]|$)")
