@@ -69,12 +69,7 @@ def _made(texts: list[tuple[str, str]], parameters: dict[str, float], reading: R
     found = []
     for path, text in texts:
         formula = TimeFormula(text, tuple(parameters.items()))
-        try:
-            parse(text, (*parameters, TIME))
-        except FormulaError as error:
-            reading.mistake(path, str(error))
-            return BAD
-        why = _too_large(formula)
+        why = why_unusable(formula)
         if why:
             reading.mistake(path, why)
             return BAD
@@ -82,10 +77,17 @@ def _made(texts: list[tuple[str, str]], parameters: dict[str, float], reading: R
     return tuple(found)
 
 
-def _too_large(formula: TimeFormula) -> str:
-    """Why a formula is too large to be used; nothing where it is not."""
+def why_unusable(formula: TimeFormula) -> str:
+    """Why a formula of time cannot be computed; nothing where it can."""
     from mdstopo.formula.law_formulas import why_too_large  # most cases have no formulas
 
+    names = [name for name, _ in formula.parameters]
+    if len(names) > MOST_PARAMETERS:
+        return f"found {len(names)} parameters, allowed are {MOST_PARAMETERS} at most"
+    try:
+        parse(formula.text, (*names, TIME))
+    except FormulaError as error:
+        return str(error)
     return why_too_large(lambda: formula.program.groups)
 
 
