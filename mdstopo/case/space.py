@@ -11,9 +11,10 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray, Triple, VectorSignal
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints.spatial import SPATIAL_JOINTS
-from mdstopo.case.loading import largest, scaled
+from mdstopo.case.loading import scaled
 from mdstopo.case.model import GROUND, Load, SpatialBody
 from mdstopo.case.outlines import build_outlines
+from mdstopo.case.prescribed import size_of
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
@@ -147,7 +148,7 @@ def _build_load(fields: Fields, body: SpatialBody, at: Any, reading: Reading) ->
         return None
     arm = max(1.0, *(abs(value) for value in at))
     share = arm / min(1.0, _least(body))
-    if not all(math.isfinite(largest(part) * share) for part in (*force, *moment)):
+    if not all(math.isfinite(size_of(part) * share) for part in (*force, *moment)):
         reading.mistake(fields.path, "the load is too large to compute with")
         return None
     if turning is not None and fields["frame"] == "global":
