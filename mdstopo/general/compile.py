@@ -34,6 +34,7 @@ from mdstopo.scene.grids import row_of
 from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
 from mdstopo.scene.other_kernels import include_kernels
+from mdstopo.scene.refusals import rows_of_responses
 from mdstopo.scene.signals import breakpoints, segment_values
 
 
@@ -199,11 +200,9 @@ def _of_motions(case: Case, load_case: LoadCase, message: str) -> Mistake:
 def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...]) -> None:
     """A joint that others imply has no force of its own to look at (CaseError)."""
     mistakes = []
-    rows: list[tuple[str, Any]] = [(f"objectives.{o.name}", o) for o in case.objectives]
-    rows += [(f"constraints[{i}]", row) for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)]
-    for path, looked in rows:
-        names = [each.joint for each in looked.response.looked if each.joint in redundant]
-        if looked.load_case == load_case.name and names:
+    for path, row in rows_of_responses(case):
+        names = [each.joint for each in row.response.parts if each.joint in redundant]
+        if row.load_case == load_case.name and names:
             mistakes.append(
                 case.marks.mistake(
                     f"{path}.response",
@@ -380,7 +379,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
     looks = any(
         over_time in ("mean", "rms", "integral") and kind_of(each).depends_on_rate
         for response, over_time in zip(responses, reductions, strict=True)
-        for each in response.looked
+        for each in response.parts
     )
     return forces or adds_damping(case) or bushed or looks or bool(case.joints) or bool(case.contacts)
 
