@@ -14,8 +14,8 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, LoadCase
 from mdstopo.compiler.formulas import address_of, call_formula
 from mdstopo.formula.time_formulas import MARGIN, VALUE
-from mdstopo.general.leading_members import roots_between
-from mdstopo.mechanics.kinematics.timed import ADDRESS, MOST, OFFSET, SCALE, TURNS, WIDTH
+from mdstopo.general.leading_members import may_vanish, roots_between
+from mdstopo.mechanics.kinematics.timed import ADDRESS, OFFSET, SCALE, TURNS, WIDTH
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.signals import formulas_of, signals_of
 
@@ -123,9 +123,7 @@ def _kinks(called: _Called, grid: FloatArray) -> Iterator[float]:
         def exact(times: FloatArray, switch: int = switch) -> FloatArray:
             return np.array([called.margin(switch, time)[0] for time in times.tolist()])
 
-        turns = (margin[:-1] >= 0.0) != (margin[1:] >= 0.0)
-        dips = (margin[:-1] * rate[:-1] < 0.0) & (margin[1:] * rate[1:] > 0.0)
-        for k in np.flatnonzero(turns | dips).tolist():
+        for k in np.flatnonzero(may_vanish(margin, rate)).tolist():
             span = float(grid[k]), float(grid[k + 1])
             values = float(margin[k]), float(margin[k + 1])
             yield from roots_between(span, values, (float(rate[k]), float(rate[k + 1])), exact)
