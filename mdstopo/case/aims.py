@@ -43,7 +43,7 @@ class Response(Value):
     unit: str = ""
 
     @property
-    def looked(self) -> tuple[Response, ...]:
+    def parts(self) -> tuple[Response, ...]:
         """The responses that it is an expression of, or itself."""
         return tuple(each for _, each in self.of) or (self,)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -9,10 +10,11 @@ from mdstopo.case.model import Case, MemberGroup
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.words import inside, number_text, shown
 
+#: sizes of a group's members, and their prices
+Sizes = tuple[tuple[float, ...], tuple[float, ...]]
 
-def with_catalogue(
-    top: Fields, groups: dict[str, MemberGroup], reading: Reading
-) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]] | None:
+
+def with_catalogue(top: Fields, groups: dict[str, MemberGroup], reading: Reading) -> dict[str, Sizes] | None:
     """By group: sizes and their prices. None where something is wrong, which is noted.
 
     groups: with the design's bounds and powers.
@@ -21,7 +23,7 @@ def with_catalogue(
     stated = design["catalogue"] if isinstance(design, Fields) else None
     if stated is BAD:
         return None
-    found: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
+    found: dict[str, Sizes] = {}
     good = True
     path = inside(design.path, "catalogue") if stated else ""
     for key, what in _alone(top) if stated else ():
@@ -56,9 +58,7 @@ def with_catalogue(
     return found if good else None
 
 
-def _sizes(
-    entry: Any, group: MemberGroup, path: str, reading: Reading
-) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+def _sizes(entry: Any, group: MemberGroup, path: str, reading: Reading) -> Sizes | None:
     """Sizes and prices of one group; None where something is wrong, which is noted."""
     is_record = isinstance(entry, Fields)
     if is_record and not entry.good():
@@ -68,25 +68,7 @@ def _sizes(
     prices = (entry["prices"] if is_record else None) or sizes
     if any(each is BAD for each in (*sizes, *prices)):
         return None
-    good = True
-    for k, (before, size) in enumerate(pairwise(sizes), start=1):
-        if not size > before:
-            words = f"found {number_text(size)}, allowed is > {number_text(before)}, the size before it"
-            reading.mistake(f"{where}[{k}]", words)
-            good = False
-    lowest = min((group.power, *group.powers))
-    for k, size in enumerate(sizes):
-        if size > group.upper or 0.0 < size < group.lower:
-            allowed = (
-                f"0, or {number_text(group.lower)} to {number_text(group.upper)}, the bounds of {shown(group.name)}"
-            )
-            reading.mistake(f"{where}[{k}]", f"found {number_text(size)}, allowed is {allowed}")
-            good = False
-        elif size == 0.0 and lowest < 1.0:
-            reading.mistake(
-                f"{where}[{k}]", f"found 0, allowed is > 0 where power is below 1 (here {number_text(lowest)})"
-            )
-            good = False
+    good = _within(sizes, group, where, reading)
     if len(prices) != len(sizes):
         reading.mistake(
             inside(path, "prices"), f"found {len(prices)} prices, needed is one for each of {len(sizes)} sizes"
@@ -98,6 +80,30 @@ def _sizes(
             reading.mistake(f"{inside(path, 'prices')}[{k}]", words)
             good = False
     return (tuple(sizes), tuple(prices)) if good else None
+
+
+def _within(sizes: Sequence[float], group: MemberGroup, path: str, reading: Reading) -> bool:
+    """Whether sizes rise, and alpha of a group's members may be each of them; notes which may not."""
+    good = True
+    for k, (before, size) in enumerate(pairwise(sizes), start=1):
+        if not size > before:
+            words = f"found {number_text(size)}, allowed is > {number_text(before)}, the size before it"
+            reading.mistake(f"{path}[{k}]", words)
+            good = False
+    lowest = min((group.power, *group.powers))
+    for k, size in enumerate(sizes):
+        if size > group.upper or 0.0 < size < group.lower:
+            allowed = (
+                f"0, or {number_text(group.lower)} to {number_text(group.upper)}, the bounds of {shown(group.name)}"
+            )
+            reading.mistake(f"{path}[{k}]", f"found {number_text(size)}, allowed is {allowed}")
+            good = False
+        elif size == 0.0 and lowest < 1.0:
+            reading.mistake(
+                f"{path}[{k}]", f"found 0, allowed is > 0 where power is below 1 (here {number_text(lowest)})"
+            )
+            good = False
+    return good
 
 
 def _alone(top: Fields) -> list[tuple[str, str]]:

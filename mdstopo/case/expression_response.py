@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mdstopo.case.aims import Response
-from mdstopo.case.formula_keys import TIME, FormulaNames, FormulaText
+from mdstopo.case.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.kinds import NUMBER, Kind, Text
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside
 from mdstopo.formula.errors import FormulaError
-from mdstopo.formula.parser import parse
+from mdstopo.formula.parser import TIME, parse
 
 if TYPE_CHECKING:
     from mdstopo.formula.response_formulas import ResponseProgram

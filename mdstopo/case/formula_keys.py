@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
 from mdstopo.case.kinds import Kind, Schema
@@ -10,10 +11,7 @@ from mdstopo.case.reading import BAD, Reading, found
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, shown
 from mdstopo.formula.errors import FormulaError
-from mdstopo.formula.parser import WORD, parse, reserved
-
-#: the name of the time in a formula, s
-TIME = "t"
+from mdstopo.formula.parser import TIME, WORD, parse, reserved
 
 
 @frozen
@@ -49,6 +47,18 @@ class FormulaText(Value):
         return {"type": ["string", "number"]}
 
 
+def why_no_name(word: str, taken: Container[str], message: str) -> str:
+    """Why nothing can be called so in a formula; nothing where it can.
+
+    taken: names that such formulas have of their own. message: what is said of these, and of functions.
+    """
+    if not WORD.fullmatch(word):
+        return f"found the name {shown(word)}, allowed is a letter (a to z, A to Z) or _, then letters, digits or _"
+    if word in taken or reserved(word):
+        return message
+    return ""
+
+
 @frozen
 class FormulaNames(Value):
     """Values of one kind by the names that a formula has for them.
@@ -74,12 +84,9 @@ class FormulaNames(Value):
             here = inside(path, word)
             reading.mark(here, value, key)
             values[word] = self.item.read(value, here, reading)
-            if not WORD.fullmatch(word):
-                allowed = "allowed is a letter (a to z, A to Z) or _, then letters, digits or _"
-                reading.mistake(here, f"found the name {shown(word)}, {allowed}", key)
-                values[word] = BAD
-            elif word == TIME or reserved(word):
-                reading.mistake(here, f"the name {word!r} is taken: it means something in every expression", key)
+            why = why_no_name(word, (TIME,), f"the name {word!r} is taken: it means something in every expression")
+            if why:
+                reading.mistake(here, why, key)
                 values[word] = BAD
         return values
 

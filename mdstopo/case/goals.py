@@ -171,11 +171,7 @@ def build_constraints(
 def _lengths_vary(row: VolumeRow, groups: dict[str, MemberGroup] | None, variables: tuple[Variable, ...]) -> bool:
     """Whether members that a row sums up cost a length that varies: then what it comes to is not known here."""
     moving = {each.points for each in variables if each.points}
-    return any(
-        groups[name].cost_by_length and bool(moving & {groups[name].from_points, groups[name].to_points})
-        for name in row.groups
-        if groups is not None and name in groups
-    )
+    return any(groups[name].cost_varies(moving) for name in row.groups if groups is not None and name in groups)
 
 
 def _response_row(

@@ -6,11 +6,10 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from mdstopo.case.arrays import Signal, Table, TimeFormula, VectorSignal
 from mdstopo.case.model import GROUND, AnyBody, Components, Load, LoadCase, Motion
 from mdstopo.case.motions import Start
+from mdstopo.case.prescribed import size_of
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside, number_text
@@ -129,7 +128,7 @@ def _build_load(fields: Fields, frames: Frames, reading: Reading) -> Load | None
 
 def scaled(signals: VectorSignal, factor: float, path: str, reading: Reading) -> Any:
     """Accelerations as forces or moments, BAD where they overflow."""
-    if not all(math.isfinite(largest(signal) * factor) for signal in signals):
+    if not all(math.isfinite(size_of(signal) * factor) for signal in signals):
         reading.mistake(path, f"times {number_text(factor)} it is too large for a number")
         return BAD
     return tuple(times_of(signal, factor) for signal in signals)
@@ -140,10 +139,3 @@ def times_of(signal: Signal, factor: float) -> Signal:
     if isinstance(signal, TimeFormula):
         return signal.times(factor)
     return Table(signal.times, signal.values * factor) if isinstance(signal, Table) else signal * factor
-
-
-def largest(signal: Signal) -> float:
-    """The largest magnitude over time; of a formula, which is judged where its times are known, its factor."""
-    if isinstance(signal, TimeFormula):
-        return abs(signal.scale)
-    return float(np.abs(signal.values).max()) if isinstance(signal, Table) else abs(signal)

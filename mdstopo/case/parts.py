@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any, TypeAlias
 
 from mdstopo.case.arrays import (
@@ -180,6 +181,10 @@ class MemberGroup(Value):
     cost_by_length: bool = False
     sizes: tuple[float, ...] = ()
     prices: tuple[float, ...] = ()
+
+    def cost_varies(self, movable: Container[str]) -> bool:
+        """Whether the V_i are lengths that vary where the points of these grids move."""
+        return self.cost_by_length and (self.from_points in movable or self.to_points in movable)
 
     def __post_init__(self) -> None:
         for name in ("from_local", "to_local", "from_world", "to_world", "length", "cost"):

@@ -12,10 +12,11 @@ from mdstopo.case.arrays import FloatArray
 from mdstopo.case.contacts import edge_contact
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints import JOINTS
-from mdstopo.case.loading import largest, scaled
+from mdstopo.case.loading import scaled
 from mdstopo.case.model import GROUND, Body, Load, Pair
 from mdstopo.case.outlines import PLANAR, build_outlines
 from mdstopo.case.point_grids import grid_count, grid_points
+from mdstopo.case.prescribed import size_of
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.responses import RESPONSES
 from mdstopo.case.schema_case import FORMAT
@@ -80,7 +81,7 @@ def _build_load(fields: Fields, body: Body, at: Any, reading: Reading) -> Load |
         return None
     arm = max(1.0, abs(at[0]), abs(at[1]))
     share = arm / min(1.0, body.mass, body.inertia)
-    if not all(math.isfinite(largest(part) * share) for part in (*force, *moment)):
+    if not all(math.isfinite(size_of(part) * share) for part in (*force, *moment)):
         reading.mistake(fields.path, "the load is too large to compute with")
         return None
     return Load(body.name, force, at, moment[0], fields["frame"])

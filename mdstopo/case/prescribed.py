@@ -37,7 +37,7 @@ def value_at(signal: Signal, time: float) -> float:
 
 
 def size_of(signal: Signal) -> float:
-    """The largest value of a signal, without its sign; of a formula its factor."""
+    """The largest magnitude over time; of a formula, which is judged where its times are known, its factor."""
     if isinstance(signal, TimeFormula):
         return abs(signal.scale)
     return float(np.abs(signal.values).max()) if isinstance(signal, Table) else abs(signal)

@@ -15,14 +15,6 @@ _AROUND = Key(
 )
 
 _IN_SPACE = "it is for a case with `dimension: 3`; in the plane there is the rectangle"
-_LINE = Record(
-    "a line",
-    (
-        Key("from", PAIR, "one end, [x, y]", required=True, unit="m"),
-        Key("to", PAIR, "the other end, [x, y]", required=True, unit="m"),
-    ),
-    doc="A straight line between two points; a point on it has one variable, its distance from the first.",
-)
 _RECTANGLE = Record(
     "a rectangle",
     (
@@ -31,6 +23,12 @@ _RECTANGLE = Record(
     ),
     doc="All that lies in a rectangle; a point in it has two variables, x and y.",
 )
+
+
+def along_line(first: Key, last: Key) -> Key:
+    """The region that is a straight line between two points."""
+    doc = "A straight line between two points; a point on it has one variable, its distance from the first."
+    return Key("line", Record("a line", (first, last), doc=doc), "the points move along a straight line")
 
 
 def movable(*regions: Key) -> Key:
@@ -57,6 +55,9 @@ def movable(*regions: Key) -> Key:
 
 
 MOVABLE = movable(
-    Key("line", _LINE, "the points move along a straight line"),
+    along_line(
+        Key("from", PAIR, "one end, [x, y]", required=True, unit="m"),
+        Key("to", PAIR, "the other end, [x, y]", required=True, unit="m"),
+    ),
     Key("rectangle", _RECTANGLE, "the points move within a rectangle"),
 )

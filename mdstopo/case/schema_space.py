@@ -16,7 +16,7 @@ from mdstopo.case.schema_case import CONSTRAINT, FORMAT, LOAD_CASE_KEY, OBJECTIV
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_fit import fit_record
 from mdstopo.case.schema_frame import FRAME, FRAMES
-from mdstopo.case.schema_movable import movable
+from mdstopo.case.schema_movable import along_line, movable
 from mdstopo.case.schema_outline import OUTLINE_IN_SPACE
 from mdstopo.case.schema_scene import (
     BODY,
@@ -279,45 +279,31 @@ _GRID = Record(
     one_of=(tuple(_GRIDS),),
     doc="Points of one kind: exactly one of these.",
 )
+_WITHIN_RECTANGLE = Record(
+    "a rectangle",
+    (
+        _CENTER,
+        Key("axes", Vector(2, DIRECTION), "directions of its sides, perpendicular", required=True),
+        Key("size", Vector(2, POSITIVE), "[a, b], along the first axis and the second", True, unit="m"),
+    ),
+    doc="All that lies in a rectangle; a point in it has two variables, u and v: how far it is from the centre along "
+    "the first axis and along the second.",
+)
+_WITHIN_BOX = Record(
+    "a box",
+    (
+        Key("from", TRIPLE, "the corner with the smallest coordinates", required=True, unit="m"),
+        Key("to", TRIPLE, "the corner with the largest", required=True, unit="m"),
+    ),
+    doc="All that lies in a box along the axes; a point in it has three variables, x, y and z.",
+)
 POINTS_KEYS = with_keys(
     POINTS,
     with_kind(POINTS, "grid", ByShape("a grid or a list of grids", sequence=ListOf(_GRID, 1, "grids"), mapping=_GRID)),
     movable(
-        Key(
-            "line",
-            Record(
-                "a line",
-                (_FROM, _TO),
-                doc="A straight line between two points; a point on it has one variable, its distance from the first.",
-            ),
-            "the points move along a straight line",
-        ),
-        Key(
-            "rectangle",
-            Record(
-                "a rectangle",
-                (
-                    _CENTER,
-                    Key("axes", Vector(2, DIRECTION), "directions of its sides, perpendicular", required=True),
-                    Key("size", Vector(2, POSITIVE), "[a, b], along the first axis and the second", True, unit="m"),
-                ),
-                doc="All that lies in a rectangle; a point in it has two variables, u and v: how far it is from the "
-                "centre along the first axis and along the second.",
-            ),
-            "the points move within a rectangle",
-        ),
-        Key(
-            "box",
-            Record(
-                "a box",
-                (
-                    Key("from", TRIPLE, "the corner with the smallest coordinates", required=True, unit="m"),
-                    Key("to", TRIPLE, "the corner with the largest", required=True, unit="m"),
-                ),
-                doc="All that lies in a box along the axes; a point in it has three variables, x, y and z.",
-            ),
-            "the points move within a box",
-        ),
+        along_line(_FROM, _TO),
+        Key("rectangle", _WITHIN_RECTANGLE, "the points move within a rectangle"),
+        Key("box", _WITHIN_BOX, "the points move within a box"),
     ),
 )
 

@@ -7,16 +7,18 @@ import re
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula, VectorSignal
+from mdstopo.case.time_formula import why_unusable
 
 
-class MixedSignalsError(Exception):
-    """A formula of time and a table would have to be added."""
+class UnaddedSignalsError(Exception):
+    """Signals that cannot be added: what they are, and what is allowed."""
 
 
 def combined(matrix: FloatArray, signals: VectorSignal) -> VectorSignal:
     """The products of a matrix (m, n) with n signals: constants where all are, else tables of common times.
 
-    Formulas where some are formulas. Raises MixedSignalsError where a formula and a table would have to be added.
+    Formulas where some are formulas. Raises UnaddedSignalsError where a formula and a table would have to be added, or
+    formulas that come to one which is too large.
     """
     if any(isinstance(signal, TimeFormula) for signal in signals):
         return tuple(_summed(row, signals) for row in matrix.tolist())
@@ -38,19 +40,29 @@ def _summed(factors: list[float], signals: VectorSignal) -> Signal:
     texts, parameters = [], dict[str, float]()
     for factor, signal in terms:
         if isinstance(signal, Table):
-            raise MixedSignalsError
+            raise UnaddedSignalsError("a formula and a table: state all as formulas, or none")
         if isinstance(signal, TimeFormula):
-            text = signal.text
-            for name, value in signal.parameters:
-                own = name
-                while parameters.get(own, value) != value:
-                    own += "_"
-                parameters[own] = value
-                text = re.sub(rf"\b{name}\b", own, text)
+            text = _renamed(signal, parameters)
             texts.append(f"{factor * signal.scale!r}*({text}) + {factor * signal.offset!r}")
         else:
             texts.append(repr(factor * signal))
-    return TimeFormula(" + ".join(f"({text})" for text in texts), tuple(parameters.items()))
+    formula = TimeFormula(" + ".join(f"({text})" for text in texts), tuple(parameters.items()))
+    why = why_unusable(formula)
+    if why:
+        raise UnaddedSignalsError(f"formulas: {why}")
+    return formula
+
+
+def _renamed(formula: TimeFormula, parameters: dict[str, float]) -> str:
+    """The text of a formula that is added to others; its parameters are put among theirs, under names still free."""
+    own = dict(formula.parameters)
+    names = {}
+    for name, value in own.items():
+        free = name
+        while parameters.get(free, value) != value or (free != name and free in own):
+            free += "_"
+        parameters[free], names[name] = value, free
+    return re.sub(r"\b[A-Za-z_]\w*", lambda word: names.get(word[0], word[0]), formula.text)
 
 
 def common_times(tables: list[Table]) -> FloatArray:

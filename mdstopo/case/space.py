@@ -11,13 +11,14 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray, Triple, VectorSignal
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints.spatial import SPATIAL_JOINTS
-from mdstopo.case.loading import largest, scaled
+from mdstopo.case.loading import scaled
 from mdstopo.case.model import GROUND, Load, SpatialBody
 from mdstopo.case.outlines import build_outlines
+from mdstopo.case.prescribed import size_of
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
-from mdstopo.case.signals import MixedSignalsError, combined
+from mdstopo.case.signals import UnaddedSignalsError, combined
 from mdstopo.case.spatial_grids import check_grid, grid_count, grid_points
 from mdstopo.case.spatial_outlines import SPATIAL
 from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
@@ -141,12 +142,13 @@ def _build_load(fields: Fields, body: SpatialBody, at: Any, reading: Reading) ->
         force = scaled(fields["acceleration"], body.mass, inside(fields.path, "acceleration"), reading)
     if fields["angular_acceleration"] is not None:
         turning = fields["angular_acceleration"]
-        moment = _weighed(turning, body.inertia, inside(fields.path, "angular_acceleration"), reading)
+        path = inside(fields.path, "angular_acceleration")
+        moment = _weighed(turning, body.inertia, fields["frame"], path, reading)
     if at is BAD or force is BAD or moment is BAD:
         return None
     arm = max(1.0, *(abs(value) for value in at))
     share = arm / min(1.0, _least(body))
-    if not all(math.isfinite(largest(part) * share) for part in (*force, *moment)):
+    if not all(math.isfinite(size_of(part) * share) for part in (*force, *moment)):
         reading.mistake(fields.path, "the load is too large to compute with")
         return None
     if turning is not None and fields["frame"] == "global":
@@ -154,15 +156,20 @@ def _build_load(fields: Fields, body: SpatialBody, at: Any, reading: Reading) ->
     return Load(body.name, force, at, moment, fields["frame"])
 
 
-def _weighed(signals: VectorSignal, tensor: FloatArray, path: str, reading: Reading) -> Any:
-    """The products of a tensor with three signals, in body axes; BAD where they overflow."""
-    if not all(math.isfinite(largest(signal) * float(np.abs(tensor).max()) * 3.0) for signal in signals):
+def _weighed(signals: VectorSignal, tensor: FloatArray, frame: str, path: str, reading: Reading) -> Any:
+    """The products of a tensor with three signals, in body axes; BAD where they overflow or cannot be added.
+
+    Of signals along global axes nothing is added here: those that cannot be stay as they are.
+    """
+    if not all(math.isfinite(size_of(signal) * float(np.abs(tensor).max()) * 3.0) for signal in signals):
         reading.mistake(path, "times the moments of inertia it is too large for a number")
         return BAD
     try:
         return combined(tensor, signals)
-    except MixedSignalsError:
-        reading.mistake(path, "its products of inertia would add a formula and a table: state all as formulas, or none")
+    except UnaddedSignalsError as error:
+        if frame == "global":
+            return signals
+        reading.mistake(path, f"its products of inertia would add {error}")
         return BAD
 
 

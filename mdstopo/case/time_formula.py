@@ -6,14 +6,14 @@ import re
 from typing import Any
 
 from mdstopo.case.arrays import TimeFormula
-from mdstopo.case.formula_keys import TIME, FormulaNames, FormulaText
+from mdstopo.case.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.kinds import NUMBER
 from mdstopo.case.nodes import MAPPING, Node
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import ByShape, Key, ListOf, Record
 from mdstopo.case.words import inside
 from mdstopo.formula.errors import FormulaError
-from mdstopo.formula.parser import parse
+from mdstopo.formula.parser import TIME, parse
 
 #: a number, and behind it an operator or nothing
 _BEGINS = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(?:[-+*/^(),<>=]|$)")
@@ -69,12 +69,7 @@ def _made(texts: list[tuple[str, str]], parameters: dict[str, float], reading: R
     found = []
     for path, text in texts:
         formula = TimeFormula(text, tuple(parameters.items()))
-        try:
-            parse(text, (*parameters, TIME))
-        except FormulaError as error:
-            reading.mistake(path, str(error))
-            return BAD
-        why = _too_large(formula)
+        why = why_unusable(formula)
         if why:
             reading.mistake(path, why)
             return BAD
@@ -82,10 +77,17 @@ def _made(texts: list[tuple[str, str]], parameters: dict[str, float], reading: R
     return tuple(found)
 
 
-def _too_large(formula: TimeFormula) -> str:
-    """Why a formula is too large to be used; nothing where it is not."""
+def why_unusable(formula: TimeFormula) -> str:
+    """Why a formula of time cannot be computed; nothing where it can."""
     from mdstopo.formula.law_formulas import why_too_large  # most cases have no formulas
 
+    names = [name for name, _ in formula.parameters]
+    if len(names) > MOST_PARAMETERS:
+        return f"found {len(names)} parameters, allowed are {MOST_PARAMETERS} at most"
+    try:
+        parse(formula.text, (*names, TIME))
+    except FormulaError as error:
+        return str(error)
     return why_too_large(lambda: formula.program.groups)
 
 

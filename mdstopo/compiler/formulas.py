@@ -57,10 +57,30 @@ def call_formula(address: float, p: Floats, x: float, xd: float, t: float, l0: f
     mode: the bits of the switches.
     group: which group of formulas.
     """
-    out = np.zeros(WIDTH)
-    numbers = np.ascontiguousarray(p)
-    _FORM(int(address))(numbers.ctypes.data, x, xd, t, l0, mode, group, out.ctypes.data)
-    return tuple(out.tolist())
+    return tuple(FormulaCalls(address, p).numbers(x, xd, t, l0, mode, group))
+
+
+class FormulaCalls:
+    """Many calls from Python of the function at an address, with one set of parameters p."""
+
+    def __init__(self, address: float, p: Floats) -> None:
+        self._function = _FORM(int(address))
+        self._p, self._out = np.ascontiguousarray(p), np.zeros(WIDTH)
+        self._p_place, self._out_place = self._p.ctypes.data, self._out.ctypes.data
+
+    def numbers(self, x: float, xd: float, t: float, l0: float, mode: int, group: int) -> list[float]:
+        """Numbers of a group, WIDTH of them; arguments as in `call_formula`.
+
+        x, xd: elongation (m) and its rate (m/s).
+        t: time (s).
+        l0: free length (m).
+        mode: the bits of the switches.
+        group: which group of formulas.
+        """
+        self._out[:] = 0.0
+        self._function(self._p_place, x, xd, t, l0, mode, group, self._out_place)
+        found: list[float] = self._out.tolist()
+        return found
 
 
 @when_compiling

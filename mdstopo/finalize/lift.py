@@ -20,7 +20,7 @@ from mdstopo.case.overrides import node_of, steps_of
 from mdstopo.case.reading import Reading
 from mdstopo.case.responses import RESPONSES
 from mdstopo.case.rotations import about_axis
-from mdstopo.case.signals import MixedSignalsError, combined
+from mdstopo.case.signals import UnaddedSignalsError, combined
 from mdstopo.case.words import inside, shown
 from mdstopo.case.yaml_text import text_of
 from mdstopo.finalize.document import Plain, content_of
@@ -127,8 +127,8 @@ class _Lift:
         """What a planar quantity over time is in space."""
         try:
             found = combined(matrix, read_signals(value, ("x", "y")[: matrix.shape[1]]))
-        except MixedSignalsError:
-            self.refuse(path, "in a tilted plane a formula and a table would be added: state both as formulas")
+        except UnaddedSignalsError as error:
+            self.refuse(path, f"a tilted plane would add {error}")
             return value
         if any(isinstance(each, TimeFormula) for each in found):
             return [_stated(each) for each in found]

@@ -111,10 +111,14 @@ def why_too_large(groups: Callable[[], tuple[Group, ...]]) -> str:
     return f"found {operations} operations in the formulas with all derivatives, allowed are {MOST_OPERATIONS} at most"
 
 
+def by_place(names: tuple[str, ...]) -> dict[Expression, Expression]:
+    """What stands for the names of numbers in formulas: "p 0" and so on, by their places."""
+    return {name(word): name(f"p {place}") for place, word in enumerate(names)}
+
+
 def _smooth(force: str | None, energy: str | None, damping: str | None, names: tuple[str, ...]) -> Smooth:
     """Force and energy, or energy and damping, with bits for comparisons and "p 0" and so on for parameters."""
-    places = {name(word): name(f"p {place}") for place, word in enumerate(names)}
-    known = {**places, name("l"): add(name("x"), name("l0"))}
+    known = {**by_place(names), name("l"): add(name("x"), name("l0"))}
 
     def read(text: str | None) -> Expression:
         return ZERO if text is None else substituted(parse(text).root, known)

@@ -28,6 +28,8 @@ MOST = 1000
 """Numbers, names, operators and functions of a formula."""
 
 CONSTANTS = {"pi": math.pi}
+TIME = "t"
+"""The name of the time in a formula, s."""
 WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _SIGN = re.compile(r"\*\*|<=|>=|==|!=|<>|&&|\|\||[-+*/^<>(),]")

@@ -9,10 +9,10 @@ import functools
 from typing import NamedTuple
 
 from mdstopo.formula.calculus import ONE, derivative, is_number, substituted
-from mdstopo.formula.law_formulas import Group, group_of, limited, lowest_of
+from mdstopo.formula.law_formulas import Group, by_place, group_of, limited, lowest_of
 from mdstopo.formula.modes import smooth
-from mdstopo.formula.parser import parse
-from mdstopo.formula.tree import NUMBER, Expression, name, names_in
+from mdstopo.formula.parser import TIME, parse
+from mdstopo.formula.tree import NUMBER, Expression, names_in
 
 #: group of the value and its slope by t; that of the smallest margin; the first of those with slopes by responses
 VALUE, LOWEST, SLOPES = 0, 1, 2
@@ -41,18 +41,18 @@ def response_program(text: str, names: tuple[str, ...], responses: int) -> Respo
 
     names: of the responses, which come first, and of the parameters. responses: how many they are.
     """
-    root = substituted(parse(text).root, {name(word): name(f"p {place}") for place, word in enumerate(names)})
+    root = substituted(parse(text).root, by_place(names))
     moving = [f"p {place}" for place in range(responses)]
-    found = smooth((root,), (*moving, "t"))
+    found = smooth((root,), (*moving, TIME))
     (f,) = found.formulas
     margins = [switch.margin for switch in found.switches]
-    groups = [group_of((f, derivative(f, "t")), limited([(f, ONE)])), group_of((lowest_of(margins, found.switches),))]
+    groups = [group_of((f, derivative(f, TIME)), limited([(f, ONE)])), group_of((lowest_of(margins, found.switches),))]
     groups += _slopes(f, moving)
     for switch in found.switches:
-        groups.append(group_of((switch.margin, derivative(switch.margin, "t"), switch.relevant)))
+        groups.append(group_of((switch.margin, derivative(switch.margin, TIME), switch.relevant)))
         groups += _slopes(switch.margin, moving)
     parts = -(-responses // WIDTH)
-    return ResponseProgram(tuple(groups), parts, len(margins), "t" in names_in(root), _is_norm(root))
+    return ResponseProgram(tuple(groups), parts, len(margins), TIME in names_in(root), _is_norm(root))
 
 
 def _slopes(formula: Expression, moving: list[str]) -> list[Group]:

@@ -9,14 +9,11 @@ import functools
 from typing import NamedTuple
 
 from mdstopo.formula.calculus import ONE, derivative, substituted
-from mdstopo.formula.law_formulas import Group, group_of, limited, lowest_of
+from mdstopo.formula.law_formulas import Group, by_place, group_of, limited, lowest_of
 from mdstopo.formula.modes import smooth
-from mdstopo.formula.parser import parse
-from mdstopo.formula.tree import name
+from mdstopo.formula.parser import TIME, parse
 from mdstopo.formula.values import value_of
 
-#: the name of the time in a formula, s
-TIME = "t"
 #: group of value, rate and second derivative; that of the smallest margin; those of a switch: margin, rate, looked at
 VALUE, LOWEST, MARGIN = 0, 1, 2
 
@@ -31,7 +28,7 @@ class TimeProgram(NamedTuple):
 @functools.lru_cache(maxsize=256)
 def time_program(text: str, names: tuple[str, ...]) -> TimeProgram:
     """Value, derivatives and switches of a formula; names: of its parameters. Raises TooManySwitchesError."""
-    root = substituted(parse(text).root, {name(word): name(f"p {place}") for place, word in enumerate(names)})
+    root = substituted(parse(text).root, by_place(names))
     found = smooth((root,), (TIME,))
     (f,) = found.formulas
     rate = derivative(f, TIME)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError, Mistake
+from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, LoadCase, Response, ResponseRow
 from mdstopo.case.responses import kind_of
 from mdstopo.general import responses as responses_of
@@ -15,7 +15,7 @@ from mdstopo.general.drives import Drives, drives, drives_all, motion_times
 from mdstopo.general.expression_rows import expression_codes, expression_data
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel
-from mdstopo.general.timed_loads import kink_times, parts_of, timed_loads
+from mdstopo.general.timed_loads import kink_times, mistake_of, parts_of, timed_loads
 from mdstopo.general.variables import (
     adds_damping,
     along,
@@ -35,6 +35,7 @@ from mdstopo.scene.grids import row_of
 from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
 from mdstopo.scene.other_kernels import include_kernels
+from mdstopo.scene.refusals import rows_of_responses
 from mdstopo.scene.signals import breakpoints, segment_values
 
 
@@ -168,11 +169,11 @@ def _refuse_impacts(case: Case, load_case: LoadCase, bodies: Kinematics, made: D
     names = [body.name for body in case.bodies]
     jointed = {name for joint in case.joints for name in joint.bodies}
     h = np.diff(times)[:-1, None]
-    d = drive[:-1]
-    reached = d[..., 0] + h * (d[..., 1] + h * (d[..., 2] + h * d[..., 3]))
+    c = drive[:-1]
+    reached = c[..., 0] + h * (c[..., 1] + h * (c[..., 2] + h * c[..., 3]))
     leap = np.abs(drive[1:, :, 0] - reached)
     extent = np.abs(drive[:, :, 0]).max(axis=0, initial=0.0) + 1e-300
-    before = d[..., 1] + h * (2.0 * d[..., 2] + 3.0 * h * d[..., 3])
+    before = c[..., 1] + h * (2.0 * c[..., 2] + 3.0 * h * c[..., 3])
     jump = np.abs(drive[1:, :, 1] - before)
     size = np.abs(drive[:, :, 1]).max(axis=0, initial=0.0) + 1e-300
     mistakes = []
@@ -181,30 +182,22 @@ def _refuse_impacts(case: Case, load_case: LoadCase, bodies: Kinematics, made: D
         leaps = len(jump) > 0 and leap[:, i].max() > 1e-9 * extent[i] and i in formulas
         if leaps:
             when = times[1 + int(leap[:, i].argmax())]
-            mistakes.append(_of_motions(case, load_case, f"the prescribed position of {name} jumps at t = {when:g} s"))
+            message = f"the prescribed position of {name} jumps at t = {when:g} s"
+            mistakes.append(mistake_of(case, load_case, "motions", message))
         elif name in jointed and len(jump) and jump[:, i].max() > 1e-9 * size[i]:
             when = times[1 + int(jump[:, i].argmax())]
             message = f"the prescribed velocity of {name} jumps at t = {when:g} s, but it is jointed: that is an impact"
-            mistakes.append(_of_motions(case, load_case, message))
+            mistakes.append(mistake_of(case, load_case, "motions", message))
     if mistakes:
         raise CaseError(mistakes, str(case.path or case.name))
-
-
-def _of_motions(case: Case, load_case: LoadCase, message: str) -> Mistake:
-    """A mistake of the motions of a load case."""
-    places = [f"load_cases.{load_case.name}.motions", "motions"]
-    path = next((path for path in places if path in case.marks), "motions")
-    return case.marks.mistake(path, message)
 
 
 def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...]) -> None:
     """A joint that others imply has no force of its own to look at (CaseError)."""
     mistakes = []
-    rows: list[tuple[str, Any]] = [(f"objectives.{o.name}", o) for o in case.objectives]
-    rows += [(f"constraints[{i}]", row) for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)]
-    for path, looked in rows:
-        names = [each.joint for each in looked.response.looked if each.joint in redundant]
-        if looked.load_case == load_case.name and names:
+    for path, row in rows_of_responses(case):
+        names = [each.joint for each in row.response.parts if each.joint in redundant]
+        if row.load_case == load_case.name and names:
             mistakes.append(
                 case.marks.mistake(
                     f"{path}.response",
@@ -379,7 +372,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
     looks = any(
         over_time in ("mean", "rms", "integral") and kind_of(each).depends_on_rate
         for response, over_time in zip(responses, reductions, strict=True)
-        for each in response.looked
+        for each in response.parts
     )
     return has_damping(case) or adds_damping(case) or looks or bool(case.joints)
 

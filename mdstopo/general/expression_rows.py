@@ -10,7 +10,7 @@ from mdstopo.general.responses import LISTED, code_of
 
 def expression_codes(response: Response, first: int) -> list[int]:
     """The columns of an expression; first: place of the first of the responses that it is of."""
-    kinds = [kind_of(each) for each in response.looked]
+    kinds = [kind_of(each) for each in response.parts]
     kernels = [LISTED[code_of(kind)] for kind in kinds]
     made = program_of(response)
     known = 0

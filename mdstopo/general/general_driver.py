@@ -277,7 +277,7 @@ class GeneralDriver:
         """Numbers of observer and body, by their names, of rotations that are looked at before the end."""
         bodies, found = self.scene.bodies, {}
         for response, reduction in zip(self.scene.responses, self.scene.reductions, strict=True):
-            for each in response.looked:
+            for each in response.parts:
                 if kind_of(each).jumps and reduction != "final":
                     pair = each.relative_to or GROUND, each.body or GROUND
                     found[pair] = np.array([bodies.index(name) for name in pair])

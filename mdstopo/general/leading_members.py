@@ -12,6 +12,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.general.competing_members import compare, members_of
 from mdstopo.general.extremes import FRACTIONS
@@ -203,6 +204,17 @@ def _roots(
         return np.asarray(f[0] - sign * f[1])
 
     yield from roots_between((low, high), (d0, d1), (s0, s1), differences)
+
+
+def may_vanish(values: FloatArray, rates: FloatArray) -> NDArray[np.bool_]:
+    """(..., K - 1): between which samples a smooth function changes its sign, or comes nearer to zero and leaves again.
+
+    values, rates (..., K): of the function at the samples.
+    """
+    left, right = values[..., :-1], values[..., 1:]
+    turns = (left >= 0.0) != (right >= 0.0)
+    dips = (left * rates[..., :-1] < 0.0) & (right * rates[..., 1:] > 0.0)
+    return np.asarray(turns | dips)
 
 
 def roots_between(

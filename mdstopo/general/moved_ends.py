@@ -112,6 +112,7 @@ class MovedEnds:
         self._case = case
         self._dimension = dimension_of(case)
         self._frames = self._dimension.frames(load_case)
+        self._stated = frames_of(case)
         self._home = None if stands_as(case, load_case) else model.home
         self._number = {body.name: i for i, body in enumerate(case.bodies)} | {GROUND: len(case.bodies)}
         self._blocks = blocks
@@ -152,7 +153,7 @@ class MovedEnds:
 
     def _place(self, model: GeneralModel, group: MemberGroup, member: FloatArray) -> FloatArray:
         """Put the ends of a group into the members' columns; (M, d) its members' directions where it is measured."""
-        frames = frames_of(self._case)
+        frames = self._stated
         d = self._dimension.point
         first_body, second_body, p, q = ends_of(group)
         apart = frames.to_world(second_body, q) - frames.to_world(first_body, p)
@@ -182,5 +183,5 @@ class MovedEnds:
         out[:, : len(own)] = own
         if (ends.group.name, ends.law) in self._measured:
             sign = 1.0 if ends.at_to else -1.0
-            out[:, -1] = sign * direction @ turned_out(frames_of(self._case), ends.grid.body, axis)[0]
+            out[:, -1] = sign * direction @ turned_out(self._stated, ends.grid.body, axis)[0]
         return out

@@ -29,7 +29,7 @@ With tau exactly at the start (at the end) it can move to one side only: that si
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.members import MODE, SCALE, SET, level_of, rate_of_row
 from mdstopo.general.model import (
@@ -65,6 +65,18 @@ from mdstopo.mechanics.laws.table import (
     law_margin_slopes,
     law_slopes,
 )
+
+
+@part
+def varies_member(model, e, i):
+    """Whether entry e of `varied` is about member i (padded)."""
+    return i >= model.varied[e, VARIED_FIRST] and i < model.varied[e, VARIED_STOP]
+
+
+@part
+def moved_side(model, e):
+    """Which end of its members entry e of `varied` moves: 0 on the pair's first body, 1 on its second."""
+    return 1 if model.varied[e, VARIED_PLACE] == SECOND_END else 0
 
 
 @kernel
@@ -140,7 +152,7 @@ def end_forces(model, e, i, segment, t, member_state, q, v, a, row, row_rate, mo
       moved (2 D,): the force times the derivative of row.
     """
     k = model.varied[e, VARIED_BLOCK]
-    side = 1 if model.varied[e, VARIED_PLACE] == SECOND_END else 0
+    side = moved_side(model, e)
     p = model.block[k, PAIR]
     by_length, by_rate, by_second, second = end_slopes(model, p, i, side, model.along[e], q, v, a, moved)
     if model.block[k, CODE] == INERTER:
@@ -230,7 +242,7 @@ def add_force_parameters(model, segment, group, who, t, member_state, q, v, a, s
         late = model.varied[e, VARIED_PLACE] > FREE_LENGTH
         if late or model.active[segment, k] == 0 or model.block[k, GROUP] != group:
             continue
-        if i >= model.varied[e, VARIED_FIRST] and i < model.varied[e, VARIED_STOP]:
+        if varies_member(model, e, i):
             slope, _ = parameter_slopes(model, e, i, segment, t, member_state, q, v, a, row, row_rate, moved)
             out[members + model.varied[e, VARIED_VALUE]] += scale * member_state[SCALE, i] * slope
 
@@ -247,8 +259,7 @@ def event_slope(model, history, member_state, event, e):
     state = history.event[event, STATE]
     who = history.event[event, MEMBER]
     given = state == 0 or history.event[event, GIVEN] != 0
-    own = who >= model.varied[e, VARIED_FIRST] and who < model.varied[e, VARIED_STOP]
-    if place > FREE_LENGTH or given or not own or law_has_pieces(model.block[k, CODE]):
+    if place > FREE_LENGTH or given or not varies_member(model, e, who) or law_has_pieces(model.block[k, CODE]):
         return 0.0
     segment = history.index[state - 1, SEGMENT]
     q = history.q[state]
@@ -296,11 +307,11 @@ def _margin_by_end(model, e, i, q, v, x, rate, mode, t):
       mode, t: the member's mode, and time (s).
     """
     k = model.varied[e, VARIED_BLOCK]
-    side = 1 if model.varied[e, VARIED_PLACE] == SECOND_END else 0
+    side = moved_side(model, e)
     code = model.block[k, CODE]
     rest = model.member[MEMBER_FREE_LENGTH, i]
-    room = np.empty(pair_freedoms(model))
-    length_by_end, rate_by_end, _, _ = end_slopes(model, model.block[k, PAIR], i, side, model.along[e], q, v, v, room)
+    spare = np.empty(pair_freedoms(model))
+    length_by_end, rate_by_end, _, _ = end_slopes(model, model.block[k, PAIR], i, side, model.along[e], q, v, v, spare)
     by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
     by_rest = law_margin_slope(code, model.law[k], FREE_LENGTH, x, rate, mode, t, model.curves, rest)
     return by_x * length_by_end + by_rate * rate_by_end + model.along[e, ALONG_FREE_LENGTH] * by_rest

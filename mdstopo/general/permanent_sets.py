@@ -17,7 +17,7 @@ Sets are counted through the blocks of the law, in their order: slots.
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.model import (
     ALONG_FREE_LENGTH,
@@ -29,7 +29,6 @@ from mdstopo.general.model import (
     MEMBER_FREE_LENGTH,
     OFFSET,
     PAIR,
-    SECOND_END,
     START,
     STOP,
     SUBJECT,
@@ -40,6 +39,7 @@ from mdstopo.general.model import (
     VARIED_STOP,
     VARIED_VALUE,
 )
+from mdstopo.general.parameters import moved_side, varies_member
 from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.general.step_history import (
     EVENTS,
@@ -301,12 +301,12 @@ def own_slope(model, history, e, entry, rate):
     place = model.varied[entry, VARIED_PLACE]
     k = model.varied[entry, VARIED_BLOCK]
     if place < 0:
-        side = 1 if place == SECOND_END else 0
+        side = moved_side(model, entry)
         s = history.event[e, STATE]
-        room = np.empty(pair_freedoms(model))
+        spare = np.empty(pair_freedoms(model))
         by_length, _, _, _ = end_slopes(
             model, model.block[k, PAIR], history.event[e, MEMBER], side, model.along[entry], history.q[s], history.v[s],
-            history.v[s], room,
+            history.v[s], spare,
         )  # fmt: skip
         return by_length - model.along[entry, ALONG_FREE_LENGTH]
     if place <= FREE_LENGTH:
@@ -318,12 +318,6 @@ def own_slope(model, history, e, entry, rate):
         model.active[history.index[state - 1, SEGMENT], k] == 0 if state > 0 else model.varied[entry, VARIED_END] != 0
     )
     return rate if begins else 0.0
-
-
-@part
-def varies_member(model, e, i):
-    """Whether entry e of `varied` is about member i (padded)."""
-    return i >= model.varied[e, VARIED_FIRST] and i < model.varied[e, VARIED_STOP]
 
 
 @kernel

@@ -334,15 +334,15 @@ def force_by_time(model, member_state, segment, t, group, i, q, v):
       group, i: the group, and the number of the member in it.
       q (n_q,), v (n,): coordinates and velocities.
     """
-    total = 0.0
-    slope = 0.0
-    own = np.empty((2, pair_freedoms(model)))
     timed = False
     for k in range(model.block.shape[0]):
         if model.block[k, GROUP] == group and law_is_timed(model.block[k, CODE], model.law[k], model.curves):
             timed = True
     if not timed:
         return 0.0
+    total = 0.0
+    slope = 0.0
+    own = np.empty((2, pair_freedoms(model)))
     for k in range(model.block.shape[0]):
         own_i = i - model.block[k, OFFSET]
         if (

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.general.expressions import MARGINS
 from mdstopo.general.extremes import FRACTION, FRACTIONS, OTHER, RATE, SHARE, STEP, VALUE, WHO
-from mdstopo.general.leading_members import Lead, apart, roots_between
+from mdstopo.general.leading_members import Lead, apart, may_vanish, roots_between
 from mdstopo.general.responses import switches_of
 from mdstopo.scene.model import FloatArray
 
@@ -58,10 +58,7 @@ def _cuts(driver: "GeneralDriver", j: int, t: FloatArray, places: FloatArray) ->
     for switch in range(switches_of(driver.scene.model, j)):
         seen = driver.sample_response(j, places, False, count, who=-2 - switch)[2].reshape(count, samples, -1)
         margin, rate = seen[:, :, 0], seen[:, :, 1] * (np.diff(t) / (samples - 1))[:, None]
-        left, right = margin[:, :-1], margin[:, 1:]
-        turns = (left >= 0.0) != (right >= 0.0)
-        dips = (left * rate[:, :-1] < 0.0) & (right * rate[:, 1:] > 0.0)
-        for w, k in np.argwhere(turns | dips).tolist():
+        for w, k in np.argwhere(may_vanish(margin, rate)).tolist():
 
             def exact(c: FloatArray, w: int = w, who: int = -2 - switch) -> FloatArray:
                 at = np.column_stack([np.full(len(c), float(w)), c])

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
-from mdstopo.case.errors import CaseError
+from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import GROUND, Case, LoadCase
-from mdstopo.compiler.formulas import address_of, call_formula
+from mdstopo.compiler.formulas import FormulaCalls, address_of
 from mdstopo.formula.time_formulas import MARGIN, VALUE
-from mdstopo.general.leading_members import roots_between
-from mdstopo.mechanics.kinematics.timed import ADDRESS, MOST, OFFSET, SCALE, TURNS, WIDTH
+from mdstopo.general.leading_members import may_vanish, roots_between
+from mdstopo.mechanics.kinematics.timed import ADDRESS, OFFSET, SCALE, TURNS, WIDTH
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.signals import formulas_of, signals_of
 
@@ -48,32 +48,39 @@ class _Called:
     def __init__(self, formula: TimeFormula) -> None:
         self.row = row_of_formula(formula)
         self.switches = formula.program.switches
+        self._calls = FormulaCalls(self.row[ADDRESS], self.row)
 
-    def group(self, group: int, time: float, mode: int) -> tuple[float, ...]:
+    def group(self, group: int, time: float, mode: int) -> list[float]:
         """The numbers of a group."""
-        found: tuple[float, ...] = call_formula(self.row[ADDRESS], self.row, 0.0, 0.0, time, 0.0, mode, group)
-        return found
+        return self._calls.numbers(0.0, 0.0, time, 0.0, mode, group)
 
-    def mode(self, time: float, switches: int | None = None) -> int:
-        """Bits of the first so many switches, of which later ones depend on earlier ones; None: of all."""
-        mode = 0
-        for switch in range(self.switches if switches is None else switches):
-            if self.group(MARGIN + switch, time, mode)[0] >= 0.0:
+    def margins(self, time: float, switches: int) -> tuple[list[list[float]], int]:
+        """Margins of the first so many switches with their rates, and their bits, on which later ones depend."""
+        found, mode = [], 0
+        for switch in range(switches):
+            margin, rate, *_ = self.group(MARGIN + switch, time, mode)
+            found.append([margin, rate])
+            if margin >= 0.0:
                 mode |= 1 << switch
-        return mode
+        return found, mode
 
-    def margin(self, switch: int, time: float) -> tuple[float, ...]:
-        """The margin of a switch, and its rate."""
-        return self.group(MARGIN + switch, time, self.mode(time, switch))[:2]
+    def mode(self, time: float) -> int:
+        """Bits of all switches."""
+        return self.margins(time, self.switches)[1]
+
+    def at(self, time: float) -> tuple[list[list[float]], float]:
+        """Margins of all switches with their rates, and the value of the formula."""
+        margins, mode = self.margins(time, self.switches)
+        return margins, self.group(VALUE, time, mode)[0]
 
 
 def row_of_formula(formula: TimeFormula) -> FloatArray:
     """(WIDTH,): the parameters, the machine code, factor and summand of a formula (`kinematics.timed`)."""
     row = np.zeros(WIDTH)
     values = [value for _, value in formula.parameters]
+    assert len(values) <= ADDRESS
     row[: len(values)] = values
     row[ADDRESS], row[SCALE], row[OFFSET] = float(address_of(formula.program.groups)), formula.scale, formula.offset
-    assert len(values) <= MOST
     return row
 
 
@@ -100,32 +107,36 @@ def kink_times(case: Case, load_case: LoadCase) -> list[float]:
     grid = np.linspace(load_case.start, load_case.end, PARTS + 1)
     for formula in formulas_of(load_case):
         called = _Called(formula)
-        found += _kinks(called, grid)
-        for time in grid.tolist():
-            if not np.isfinite(called.group(VALUE, time, called.mode(time))[0]):
-                places = [f"load_cases.{load_case.name}", "loads" if _is_load(load_case, formula) else "motions"]
-                path = next((path for path in places if path in case.marks), places[-1])
-                message = f"the expression {formula.text} has no value at t = {time:.6g} s"
-                raise CaseError([case.marks.mistake(path, message)], str(case.path or case.name))
+        margins, values = zip(*(called.at(time) for time in grid.tolist()), strict=True)
+        found += _kinks(called, grid, np.array(margins))
+        missing = ~np.isfinite(values)
+        if missing.any():
+            section = "loads" if _is_load(load_case, formula) else "motions"
+            message = f"the expression {formula.text} has no value at t = {grid[missing.argmax()]:.6g} s"
+            raise CaseError([mistake_of(case, load_case, section, message)], str(case.path or case.name))
     return found
+
+
+def mistake_of(case: Case, load_case: LoadCase, section: str, message: str) -> Mistake:
+    """A mistake of the loads or the motions of a load case, its own ones where it states such."""
+    own = f"load_cases.{load_case.name}.{section}"
+    return case.marks.mistake(own if own in case.marks else section, message)
 
 
 def _is_load(load_case: LoadCase, formula: TimeFormula) -> bool:
     return any(signal is formula for load in load_case.loads for signal in signals_of(load))
 
 
-def _kinks(called: _Called, grid: FloatArray) -> Iterator[float]:
-    """Where margins vanish between times of a grid."""
+def _kinks(called: _Called, grid: FloatArray, margins: FloatArray) -> Iterator[float]:
+    """Where margins vanish between times of a grid (K,); margins (K, switches, 2): there, with their rates."""
     for switch in range(called.switches):
-        margin, rate = np.array([called.margin(switch, time) for time in grid.tolist()]).T
-        rate *= grid[1] - grid[0]
+        margin, rate = margins[:, switch].T
+        rate = rate * (grid[1] - grid[0])
 
         def exact(times: FloatArray, switch: int = switch) -> FloatArray:
-            return np.array([called.margin(switch, time)[0] for time in times.tolist()])
+            return np.array([called.margins(time, switch + 1)[0][switch][0] for time in times.tolist()])
 
-        turns = (margin[:-1] >= 0.0) != (margin[1:] >= 0.0)
-        dips = (margin[:-1] * rate[:-1] < 0.0) & (margin[1:] * rate[1:] > 0.0)
-        for k in np.flatnonzero(turns | dips).tolist():
+        for k in np.flatnonzero(may_vanish(margin, rate)).tolist():
             span = float(grid[k]), float(grid[k + 1])
             values = float(margin[k]), float(margin[k + 1])
             yield from roots_between(span, values, (float(rate[k]), float(rate[k + 1])), exact)

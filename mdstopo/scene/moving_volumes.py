@@ -20,7 +20,7 @@ from mdstopo.scene.bodies import distances
 def moves(case: Case, group: MemberGroup) -> bool:
     """Whether members of a group cost their length, and it varies."""
     names = {each.grid for each in case.movable}
-    return group.design and group.cost_by_length and bool(names & {group.from_points, group.to_points})
+    return group.design and group.cost_varies(names)
 
 
 def moving_volumes(case: Case) -> dict[int, MovingVolume]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from mdstopo.case.errors import Mistake
 from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.case.model import Case, MemberGroup, Response, ResponseRow, VolumeRow
+from mdstopo.case.model import Case, MemberGroup, Objective, Response, ResponseRow, VolumeRow
 from mdstopo.case.words import number_text
 from mdstopo.scene.family import beyond_collocation, beyond_springs
 from mdstopo.scene.moving_volumes import moving_volumes
@@ -58,7 +58,7 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
         yield "solver.sensitivity", no_derivatives(case, solver.sensitivity)[1]
     for group in case.priced_groups:
         yield from _unpriced(case, group)
-    for path, response in _looked_at(case):
+    for path, response in _responses(case):
         if response.since == "settled" and not solver.settle:
             yield f"{path}.response.{response.kind}.since", "settled needs `solver: {settle: true}`"
         for name, part in response.of:
@@ -67,12 +67,17 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
                 yield key, "within an expression displacements count from where the case has them: stated"
 
 
-def _looked_at(case: Case) -> Iterator[tuple[str, Response]]:
-    """All responses of a case, with the key path of what asks for them."""
-    yield from ((f"objectives.{each.name}", each.response) for each in case.objectives)
+def rows_of_responses(case: Case) -> Iterator[tuple[str, Objective | ResponseRow]]:
+    """The objectives, and the constraints on responses, with their key paths."""
+    yield from ((f"objectives.{each.name}", each) for each in case.objectives)
     for i, row in enumerate(case.constraints):
         if isinstance(row, ResponseRow):
-            yield f"constraints[{i}]", row.response
+            yield f"constraints[{i}]", row
+
+
+def _responses(case: Case) -> Iterator[tuple[str, Response]]:
+    """All responses of a case, with the key path of what asks for them."""
+    yield from ((path, row.response) for path, row in rows_of_responses(case))
     if case.fit is not None:
         yield from ((f"fit.measured.{each.name}", each.response) for each in case.fit.series)
 

@@ -269,6 +269,9 @@ def test_what_has_no_component_in_a_tilted_plane_is_refused() -> None:
         "objectives.G2.response.displacement.component",
         "objectives.G4.response.angular_velocity",
     ]
+    text = PLANAR.replace("loads:\n", "loads:\n  - {body: a, force: ['10*t', {table: [[0, 0], [1, 1]]}]}\n", 1)
+    with pytest.raises(CaseError, match="force: a tilted plane would add a formula and a table: state all as formulas"):
+        lifted(read_case(text), (0.6, 0.8, 0), 0.1)
 
 
 def test_the_command_writes_or_prints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import mdstopo
+from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.signals import combined
 from tests.variables.support import differences
 
 PLANE = """
@@ -72,6 +74,10 @@ IN_SPACE = {
         "angular_acceleration: {table: [[0, 0, 1, 5], [0.4, 4, 1, 5]]}, frame: body",
         "angular_acceleration: ['10*t', '1', 5], frame: body",
     ),
+    "some_by_tables": (
+        "angular_acceleration: {table: [[0, 0, 1, 5], [0.4, 4, 1, 5]]}",
+        "angular_acceleration: ['10*t', {table: [[0, 1]]}, 5]",
+    ),
 }
 
 
@@ -100,6 +106,28 @@ def test_a_load_by_formulas_is_that_of_the_table_which_they_repeat(kind: str, in
 @pytest.mark.parametrize("kind", IN_SPACE)
 def test_in_space_a_load_by_formulas_is_that_of_the_table_which_they_repeat(kind: str) -> None:
     assert_same(SPACE, IN_SPACE[kind], integrator="runge_kutta", tolerance=1e-10)
+
+
+def test_a_sum_of_formulas_keeps_apart_what_they_have_one_name_for() -> None:
+    first = TimeFormula("a*t", (("a", 1.0),))
+    second = TimeFormula("a*t + a_*cos(a)", (("a", 2.0), ("a_", 3.0)), 2.0, 0.5)
+    matrix = np.array([[0.5, 0.1, 1.0], [0.1, 0.4, 0.0]])
+    found = [signal.at(0.3) for signal in combined(matrix, (first, second, 0.7)) if isinstance(signal, TimeFormula)]
+    expected = matrix @ [0.3, 2.0 * (2.0 * 0.3 + 3.0 * np.cos(2.0)) + 0.5, 0.7]
+    assert found == pytest.approx(expected.tolist(), rel=1e-14)
+
+
+def test_formulas_that_products_of_inertia_cannot_add_are_refused() -> None:
+    def of_numbers(name: str) -> str:
+        names = [f"{name}{k}" for k in range(5)]
+        numbers = ", ".join(f"{each}: {k + 1}" for k, each in enumerate(names))
+        return f"{{formula: '({' + '.join(names)})*t', parameters: {{{numbers}}}}}"
+
+    place = r"loads\[0\]\.angular_acceleration: its products of inertia would add "
+    with pytest.raises(CaseError, match=place + "formulas: found 10 parameters, allowed are 8 at most"):
+        loaded(SPACE, f"angular_acceleration: [{of_numbers('a')}, {of_numbers('b')}, 0], frame: body")
+    with pytest.raises(CaseError, match=place + "a formula and a table: state all as formulas, or none"):
+        loaded(SPACE, "angular_acceleration: ['t', {table: [[0, 0], [1, 1]]}, 0], frame: body")
 
 
 def test_steps_of_collocation_take_loads_by_formulas_too() -> None:

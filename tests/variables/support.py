@@ -6,6 +6,19 @@ from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.session.run_session import run_session
 
+#: objectives and a constraint of a scene with the body `m` and the group of members `t`
+OBJECTIVES = """\
+objectives:
+  E: {response: energy, over_time: max}
+  M: {response: energy, over_time: mean}
+  X: {response: {displacement: {body: m, at: [0.1, 0.1]}}, over_time: final}
+  B: {response: {member_force: {group: t}}, over_time: max}
+  A: {response: {acceleration: {body: m, component: x}}, over_time: rms}
+combine: {weights: {E: 1, M: 1, X: 1, B: 1, A: 1}, normalize: false}
+constraints:
+  - {response: {angle: {body: m}}, over_time: max_abs, limit: 3}
+"""
+
 
 def case_of(text, **solver):
     return read_case(text, overrides={f"solver.{key}": str(value) for key, value in solver.items()})

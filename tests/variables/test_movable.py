@@ -18,7 +18,7 @@ from mdstopo.scene.bodies import stands_as
 from mdstopo.scene.moving_volumes import spent
 from mdstopo.session.run_session import run_session
 from mdstopo.store.result_reader import read_result
-from tests.variables.support import differences, whole, whole_and_resumed, widths
+from tests.variables.support import OBJECTIVES, differences, whole, whole_and_resumed, widths
 from tests.variables.test_parameters import LAWS
 
 SCENE = """
@@ -42,17 +42,9 @@ members:
   s: {from: hooks, to: eyes, law: {type: spring, stiffness: 40, damping: 1}}
   t: {from: eyes, to: hooks, law: LAW, cost: length}
 design: {initial: 0.8, variables: {VARIABLES}}
-objectives:
-  E: {response: energy, over_time: max}
-  M: {response: energy, over_time: mean}
-  X: {response: {displacement: {body: m, at: [0.1, 0.1]}}, over_time: final}
-  B: {response: {member_force: {group: t}}, over_time: max}
-  A: {response: {acceleration: {body: m, component: x}}, over_time: rms}
-combine: {weights: {E: 1, M: 1, X: 1, B: 1, A: 1}, normalize: false}
-constraints:
-  - {response: {angle: {body: m}}, over_time: max_abs, limit: 3}
-  - {volume: [t], limit: 9}
-solver: {SOLVER}
+"""
+SCENE += f"""{OBJECTIVES}  - {{volume: [t], limit: 9}}
+solver: {{SOLVER}}
 """
 SLIDE = "joints: [{type: prismatic, bodies: [ground, m], at: [0, 0], axis: [0.8, 0.3]}]"
 

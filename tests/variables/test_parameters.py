@@ -7,7 +7,7 @@ import mdstopo
 from mdstopo.case import laws as declared
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.reader import read_case
-from tests.variables.support import differences, with_variables
+from tests.variables.support import OBJECTIVES, differences, with_variables
 
 SCENE = """
 format: 1
@@ -21,16 +21,8 @@ members:
       law: {type: spring, stiffness: 40, damping: 1}}
   t: {from: {body: ground, at: [1, 0]}, to: {body: m, at: [0.1, 0]}, law: LAW}
 design: {initial: 0.8, variables: {VARIABLES}}
-objectives:
-  E: {response: energy, over_time: max}
-  M: {response: energy, over_time: mean}
-  X: {response: {displacement: {body: m, at: [0.1, 0.1]}}, over_time: final}
-  B: {response: {member_force: {group: t}}, over_time: max}
-  A: {response: {acceleration: {body: m, component: x}}, over_time: rms}
-combine: {weights: {E: 1, M: 1, X: 1, B: 1, A: 1}, normalize: false}
-constraints:
-  - {response: {angle: {body: m}}, over_time: max_abs, limit: 3}
 """
+SCENE += OBJECTIVES
 GAP = "{type: gap, side: compression, stiffness: 300, damping: 4, gap: 0.1}"
 #: by name: the law, and by parameter its value, and the bounds that its differences are a share of
 LAWS = {

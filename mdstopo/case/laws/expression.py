@@ -6,15 +6,15 @@ import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from mdstopo.case.formula_keys import FormulaText
+from mdstopo.case.formula_keys import FormulaText, why_no_name
 from mdstopo.case.kinds import NUMBER, Schema
 from mdstopo.case.laws.law import Law, free_length_key
 from mdstopo.case.nodes import MAPPING, Node
 from mdstopo.case.reading import BAD, Fields, Reading, found
 from mdstopo.case.value import Value, frozen, stated
-from mdstopo.case.words import inside, shown
+from mdstopo.case.words import inside
 from mdstopo.formula.errors import FormulaError
-from mdstopo.formula.parser import WORD, parse, reserved
+from mdstopo.formula.parser import WORD, parse
 from mdstopo.formula.tree import names_in
 
 if TYPE_CHECKING:
@@ -61,13 +61,10 @@ class Parameters(Value):
 
 def _why_not(word: str) -> str:
     """Why a parameter cannot be called so; nothing where it can."""
-    if not WORD.fullmatch(word):
-        return f"found the name {shown(word)}, allowed is a letter (a to z, A to Z) or _, then letters, digits or _"
-    if word in MOTION or reserved(word):
-        return f"the name {word!r} is taken: it means something in every formula of a law"
-    if hasattr(OfFormulas, word) or word.startswith("__"):
+    why = why_no_name(word, MOTION, f"the name {word!r} is taken: it means something in every formula of a law")
+    if not why and (hasattr(OfFormulas, word) or word.startswith("__")):
         return f"the name {word!r} is used by the program, choose another"
-    return ""
+    return why
 
 
 @frozen(kw_only=True)

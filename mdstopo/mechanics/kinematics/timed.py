@@ -1,12 +1,13 @@
 """Quantities that are formulas of time: loads and driven coordinates. What they do to bodies is each dimension's."""
 
+from mdstopo.case.time_formula import MOST_PARAMETERS
 from mdstopo.compiler.formulas import call_formula
 from mdstopo.compiler.jit import part
 from mdstopo.formula.time_formulas import VALUE
 
 #: columns of `GeneralModel.timed_par` and `driven_par`: parameters first, then where the formula is (0: there is none),
 #: what it is multiplied by, and what is added
-MOST, ADDRESS, SCALE, OFFSET, WIDTH = 8, 8, 9, 10, 11
+ADDRESS, SCALE, OFFSET, WIDTH = range(MOST_PARAMETERS, MOST_PARAMETERS + 4)
 #: columns of `GeneralModel.timed_load`: the body, what acts on it, and as `load_follows`
 BODY, KIND, TURNS = range(3)
 #: what acts: a force at a point, a moment
