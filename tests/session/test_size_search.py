@@ -7,7 +7,7 @@ import pytest
 
 from mdstopo.optimizer.interface import make, run
 from mdstopo.optimizer.problem import LinearRows, Sample
-from mdstopo.session.size_search import FEW, SizeSearch, Sold, Within
+from mdstopo.session.size_search import FEW, Catalogued, SizeSearch, Within
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import Status
 
@@ -41,8 +41,8 @@ def search_of(problem, sizes, prices=None, others=0):
     n = len(problem.initial) - others
     begin = solve(problem, problem.initial).best_alpha
     own = tuple(np.array(sizes) for _ in range(n))
-    sold = Sold(np.arange(n), own, own if prices is None else tuple(np.array(prices) for _ in range(n)))
-    return SizeSearch(problem, sold, begin, solve, 1e-8)
+    catalogued = Catalogued(np.arange(n), own, own if prices is None else tuple(np.array(prices) for _ in range(n)))
+    return SizeSearch(problem, catalogued, begin, solve, 1e-8)
 
 
 def brute(problem, sizes, prices=None):
