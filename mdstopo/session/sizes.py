@@ -70,7 +70,7 @@ class Sizes:
         self._before = view
         if state is None or not self.is_chosen(state):
             return
-        with self._whole(view):
+        with _whole(view):
             arrays = view.under(SEARCH)
             found, catalogued = found_in(arrays), self._catalogued(arrays["place"].tolist())
             self._continuous = self._sign * float(view.array(f"{CATALOGUE}/continuous"))
@@ -102,9 +102,9 @@ class Sizes:
         search = SizeSearch(held, catalogued, held.initial, self._solve, self.case.optimizer.tolerance)
         self._search = search
         if self._before is not None:
-            with self._whole(self._before):
+            with _whole(self._before):
                 search.restore(self._before.under(SEARCH))
-        of = count_text(int(self._members().sum()))
+        of = count_text(sum(len(group) for group in self.case.design_groups if group.sizes))
         notify(f"choosing sizes of {self._kept} members of {of}, {count_text(catalogued.choices)} choices")
 
         def save(found: Found) -> None:
@@ -115,15 +115,19 @@ class Sizes:
         self.outcome = self._outcome(found, catalogued)
         if (not found.finished and stop()) or found.x is None:
             return state
+        return self._end(problem, state, found.x, found)
+
+    def _end(self, problem: Problem, state: State, x: Floats, found: Found) -> State:
+        """The last state of a run: of the choice x (n,), behind that of the continuous optimum."""
         # its sizes have been checked at their prices, and it does not move: rows that are free of bounds hold it
         rows = problem.linear
         free = replace(
             rows, b=np.full(len(rows), np.abs(rows.A).sum() + np.abs(rows.b).sum()), equal=rows.equal & False
         )
-        marked = Marked(Within(problem, [0], found.x, found.x, free), STAGE, stage_count(self.case))
-        last = continued(state, make_optimizer(self.case, marked).start(found.x))
+        marked = Marked(Within(problem, [0], x, x, free), STAGE, stage_count(self.case))
+        last = continued(state, make_optimizer(self.case, marked).start(x))
         space = self.case.space
-        design = space.expand(found.x)
+        design = space.expand(x)
         last.history.constraints[-1] = rows.excess(space.reduce(at_prices(self.case, design)))
         for row in last.history.info.get("constraints", [])[-1:]:
             row[:] = excess_at_prices(self.case, design, row)
@@ -164,23 +168,10 @@ class Sizes:
 
     # -- how
 
-    @contextmanager
-    def _whole(self, view: ResultView) -> Iterator[None]:
-        """What is missing in a file, or of another kind, is damage of the file."""
-        try:
-            yield
-        except (KeyError, ValueError, TypeError, IndexError) as error:
-            raise DamagedError(f"{view.path}: damaged: the search for sizes is not whole ({error})") from error
-
     @property
     def _sign(self) -> float:
         """-1 where the objective is to be maximised, and so U is its negative."""
         return -1.0 if self.case.objectives[0].sense == "maximize" else 1.0
-
-    def _members(self) -> NDArray[np.bool_]:
-        """(N,) which design members have a catalogue."""
-        groups = self.case.design_groups
-        return np.repeat([bool(group.sizes) for group in groups], [len(group) for group in groups])
 
     def _held(self, problem: Problem, x: Floats) -> tuple[Within, Catalogued]:
         """The problem with members that are not kept at their least size, and the variables of the others."""
@@ -251,6 +242,15 @@ class Sizes:
             f"sizes of {self._kept} members chosen: {how}, {found.evaluations} evaluations; "
             f"{worse:.3%} worse than the continuous optimum"
         )
+
+
+@contextmanager
+def _whole(view: ResultView) -> Iterator[None]:
+    """What is missing in a file, or of another kind, is damage of the file."""
+    try:
+        yield
+    except (KeyError, ValueError, TypeError, IndexError) as error:
+        raise DamagedError(f"{view.path}: damaged: the search for sizes is not whole ({error})") from error
 
 
 def _kept(view: ResultView) -> Datasets:
