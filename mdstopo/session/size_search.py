@@ -224,7 +224,7 @@ class SizeSearch:
         x, value = state.best_alpha, float(state.best_objective)
         slope = state.gradients[0] if len(state.gradients) else np.zeros(len(x))
         self._try_near(node, x, slope)
-        if value >= self._cutoff():
+        if value >= self._cutoff() or not len(node.low):
             return
         off = [
             self._off_size(x[place], sizes)

@@ -132,6 +132,22 @@ def test_nothing_is_chosen_where_no_choice_keeps_the_rows():
     assert found.objective == np.inf
 
 
+def test_a_search_ends_where_no_member_is_kept_and_another_optimum_is_met():
+    problem, calls = Springs(5, 4, 0.5), []
+
+    def solve_anew(within, x):
+        state = solve(within, x)
+        calls.append(state.best_objective)
+        if len(calls) == 3:  # behind both of the relaxation: that of the one choice there is
+            state.best_objective *= 1.01
+        return state
+
+    none = Catalogued(np.zeros(0, dtype=np.int64), (), ())
+    found = SizeSearch(problem, none, problem.initial, solve_anew, 1e-8).run(never, nothing)
+    assert found.finished
+    assert found.objective == 1.01 * calls[2]
+
+
 def test_a_limit_that_is_no_line_is_kept():
     class Limited(Springs):
         def evaluate(self, x, gradient=True):
