@@ -252,9 +252,8 @@ def _say_variables(output: Output, case: "Case") -> None:
         return
     from mdstopo.cli.show import values_text
 
-    what = "coordinates of points" if all(each.points for each in case.variables) else "values of laws"
-    if case.movable and what == "values of laws":
-        what += " and coordinates of points"
+    of_laws = not all(each.points for each in case.variables)
+    what = " and ".join(["values of laws"] * of_laws + ["coordinates of points"] * bool(case.movable))
     output.say(f"{case.space.length - case.n_design} {what} that vary")
     rows = [["variable", "of", "values", "initial", "lower", "upper", "unit", "cost"]]
     for each in case.variables:

@@ -239,7 +239,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
         else:
             design = np.concatenate([outcome.alpha, *outcome.variables.values()])
             chosen = outcome.sizes is not None and bool(outcome.sizes.sizes)
-            used = row.spent(at_prices(case, design)) if chosen else spent(case, row, design)
+            used = spent(case, row, at_prices(case, design) if chosen else design)
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))
     width = case.upper - case.lower

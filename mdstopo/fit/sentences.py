@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-#: correlations from here on are named
-TOGETHER = 0.95
+#: estimates with a larger correlation are named
+CORRELATED = 0.95
 
 
-def told_apart(content: Mapping[str, Any]) -> list[str]:
+def undetermined(content: Mapping[str, Any]) -> list[str]:
     """What the data cannot tell, or hardly: a sentence for each combination of estimates. content: of `record`."""
     found = []
     for each in content["directions"] or ():
@@ -17,12 +17,12 @@ def told_apart(content: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def together(content: Mapping[str, Any]) -> list[str]:
+def correlated(content: Mapping[str, Any]) -> list[str]:
     """Which estimates vary together: a sentence for each pair. content: of `record`."""
     names = [each["name"] for each in content["estimates"]]
     return [
         f"{names[j]} and {names[i]} vary together: correlation {both:.4g}"
         for i, row in enumerate(content["correlation"] or ())
         for j, both in enumerate(row[:i])
-        if both is not None and abs(both) > TOGETHER
+        if both is not None and abs(both) > CORRELATED
     ]

@@ -82,10 +82,6 @@ class Evaluated(NamedTuple):
     deviation: FloatArray
 
 
-def _unseen(_evaluated: Evaluated) -> None:
-    """Nobody wants to know."""
-
-
 def stated_deviations(problem: FitProblem) -> FloatArray:
     """(n,) the deviations that are known; NaN where they are not."""
     return np.concatenate(
@@ -97,7 +93,7 @@ def fitted(
     problem: FitProblem,
     start: FloatArray,
     stop: Callable[[], bool] = lambda: False,
-    seen: Seen = _unseen,
+    seen: Seen = lambda _: None,
 ) -> Minimum:
     """The fit from a start (p,), with its deviations. Raises StoppedError.
 
@@ -155,7 +151,7 @@ def minimum(
     held: IndexArray | None = None,
     stop: Callable[[], bool] = lambda: False,
     precision: float = COST,
-    seen: Seen = _unseen,
+    seen: Seen = lambda _: None,
 ) -> Minimum:
     """The nearest minimum with known deviations.
 

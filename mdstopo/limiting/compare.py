@@ -89,12 +89,13 @@ def _best(case: Case, view: ResultView) -> dict[str, float | None]:
 
 
 def kept_iterates(case: Case, view: ResultView) -> NDArray[np.bool_]:
-    """(K + 1,) which iterates keep all limits, with the powers of the last stage."""
+    """(K + 1,) which iterates keep all limits, with the powers of the last stage, or with the sizes chosen."""
     excess = np.asarray(view.array("iterations/constraints"), dtype=np.float64)
     good = np.ones(len(excess), dtype=np.bool_)
     for i, row in enumerate(case.constraints):
         over = {"limit": excess[:, i], "at_least": -excess[:, i], "equals": np.abs(excess[:, i])}[row.sense]
         good &= over <= TOLERATED * (abs(row.bound) or 1.0)
     if "iterations/stage" in view.arrays:
-        good &= np.asarray(view.array("iterations/stage")) == stage_count(case) - 1
+        stage = np.asarray(view.array("iterations/stage"))
+        good &= stage == max(stage_count(case) - 1, stage.max(initial=0))
     return good

@@ -18,13 +18,16 @@ FIRST, SECOND = "#D55E00", "#0072B2"
 
 def draw(module: Any, source: Source) -> Any:
     """The design that the optimiser began with, and that of the file, at the start of the motion."""
-    case, q = source.case, start_state(source.case)
+    case, q = source.stated, start_state(source.case)
     figure = module.Figure(figsize=(2.0 * WIDTH, 3.1))
-    stage = Stage(source, q[None])
-    for axis, design, title in zip(
-        figure.subplots(1, 2), (np.asarray(case.initial), source.alpha), ("start", "design"), strict=True
-    ):
-        thick = thickness(source, design)
+    # points that are design variables began elsewhere; both pictures have one scale
+    pair = (source.as_stated(), source)
+    stages = [Stage(each, q[None]) for each in pair]
+    window = np.concatenate([stage.cloud for stage in stages])
+    axes, designs = figure.subplots(1, 2), (np.asarray(case.initial), source.alpha)
+    for axis, shown, stage, design, title in zip(axes, pair, stages, designs, ("start", "design"), strict=True):
+        stage.cloud = window
+        thick = thickness(shown, design)
         stage.draw(axis, q, thick, (None, None))
         axis.set_title(f"{title}; width: {thick.what}" if thick.what else title, loc="left")
     return figure

@@ -1,13 +1,15 @@
 """Pictures of a result of `mdstopo fit`: measured and fitted series, correlations of estimates, profiles."""
 
 import math
+import re
 from collections.abc import Mapping
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 
 from mdstopo.fit.record import content as content_of
-from mdstopo.plots.fitted_curves import fitted_curves
+from mdstopo.plots.fitted_curves import fitted_curves, profile_curves
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import colour, ink
 from mdstopo.store.store_errors import StoreError
@@ -16,8 +18,14 @@ from mdstopo.store.store_errors import StoreError
 WIDTH, HEIGHT = 6.8, 2.3
 #: estimates up to which correlations are written into their squares
 WRITTEN = 14
-#: points of a drawn parabola
-FINE = 81
+#: letters that have room: beside a series, above a profile
+BESIDE, ABOVE = 34, 30
+
+
+def folded(text: str, letters: int) -> str:
+    """Text in lines of so many letters, which may end within a name, behind `_` or a point."""
+    ends = re.sub(r"(?<=[._])", "\t", text)
+    return fill(ends, letters, expand_tabs=False, replace_whitespace=False).replace("\t", "")
 
 
 def draw(module: Any, source: Source) -> Any:
@@ -46,8 +54,8 @@ def _values(axis: Any, each: Mapping[str, Any], curve: tuple[Any, Any], k: int) 
         each["t"], each["measured"], "o", color=ink(), markersize=2.5, fillstyle="none", markeredgewidth=0.6,
         label="measured",
     )  # fmt: skip
-    axis.set_title(each["name"], loc="left")
-    axis.set_ylabel(f"{each['response']}, {each['unit']}")
+    axis.set_title(folded(each["name"], BESIDE), loc="left")
+    axis.set_ylabel(folded(f"{each['response']}, {each['unit']}", BESIDE))
     axis.legend()
 
 
@@ -101,16 +109,13 @@ def draw_profiles(module: Any, source: Source) -> Any:
     for axis in axes[len(profiled) :]:
         axis.set_visible(False)
     for k, (axis, each) in enumerate(zip(axes, profiled, strict=False)):
-        own = each["profile"]
-        values, t = (np.array([np.nan if x is None else x for x in own[key]]) for key in ("values", "t"))
-        known = np.isfinite(t)
-        fine = np.linspace(values[0], values[-1], FINE)
-        factor, straight = ((x - each["value"]) / each["deviation"] for x in (each["high"], fine))
-        axis.axhline(factor**2, color=ink("faint"), linewidth=0.6, linestyle="--")
-        axis.plot(fine, straight**2, color=ink("middle"), linewidth=0.8, linestyle=":", label="parabola")
-        axis.plot(fine, np.interp(fine, values[known], t[known]) ** 2, color=colour(k), label="profile")
-        axis.plot(values, t**2, "o", color=colour(k))
-        axis.set_title(each["name"], loc="left")
+        own = profile_curves(each, each["profile"])
+        axis.axhline(own.end, color=ink("faint"), linewidth=0.6, linestyle="--")
+        axis.plot(own.fine, own.parabola, color=ink("middle"), linewidth=0.8, linestyle=":", label="parabola")
+        axis.plot(own.fine, own.between, color=colour(k), label="profile")
+        axis.plot(own.values, own.rise, "o", color=colour(k))
+        axis.locator_params(axis="x", nbins=4)
+        axis.set_title(folded(each["name"], ABOVE), loc="left")
         axis.set_ylabel("rise of the squares" if k % columns == 0 else "")
         axis.legend()
     return figure

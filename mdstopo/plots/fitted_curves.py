@@ -1,12 +1,41 @@
-"""What a fitted scene says between the measured times, as an instrument with its offset and delay would record it."""
+"""Curves of a fit: each series between the measured times, with the instrument's offset and delay, and profiles."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mdstopo.plots.source import SAMPLES, Floats, Source
 from mdstopo.plots.watch import response_history
+
+#: points of a profile's curves
+FINE = 81
+
+
+class ProfileCurves(NamedTuple):
+    """A profile as it is drawn.
+
+    values, rise (k,): where the estimate was held, and by how much the squares rise there. fine (FINE,): values between
+    the ends; between, parabola (FINE,): the rise there, by the profile and as the interval has it. end: the rise at
+    which the interval ends.
+    """
+
+    values: Floats
+    rise: Floats
+    fine: Floats
+    between: Floats
+    parabola: Floats
+    end: float
+
+
+def profile_curves(estimate: Mapping[str, Any], profile: Mapping[str, Any]) -> ProfileCurves:
+    """The curves of an estimate's profile. estimate, profile: of `fit.record.content`."""
+    values, t = (np.array([np.nan if x is None else x for x in profile[key]]) for key in ("values", "t"))
+    known = np.isfinite(t)
+    fine = np.linspace(values[0], values[-1], FINE)
+    factor, straight = ((x - estimate["value"]) / estimate["deviation"] for x in (estimate["high"], fine))
+    between = np.interp(fine, values[known], t[known])
+    return ProfileCurves(values[known], t[known] ** 2, fine, between**2, straight**2, float(factor**2))
 
 
 def fitted_curves(source: Source, content: Mapping[str, Any]) -> dict[str, tuple[Floats, Floats]]:

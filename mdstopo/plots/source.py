@@ -1,5 +1,6 @@
 """What a picture is made from: a result file, and the case in it."""
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -57,6 +58,12 @@ class Source:
         case, arrays = self.stated, self.view.arrays
         shown = "design/alpha" in arrays or "pareto/alpha" in arrays
         return placed(case, self.design) if case.movable and shown else case
+
+    def as_stated(self) -> "Source":
+        """The same with points where the case states them."""
+        other = copy(self)
+        other.__dict__["case"] = self.stated
+        return other
 
     @property
     def title(self) -> str:

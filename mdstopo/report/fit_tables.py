@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from mdstopo.fit.record import content as content_of
-from mdstopo.fit.sentences import together, told_apart
-from mdstopo.plots.fitted_curves import fitted_curves
+from mdstopo.fit.sentences import correlated, undetermined
+from mdstopo.plots.fitted_curves import fitted_curves, profile_curves
 from mdstopo.plots.source import Source
 
 
@@ -29,7 +29,7 @@ def fit_part(source: Source, curves: bool = True, rows: int = 0) -> dict[str, An
     return {
         "confidence": content["confidence"],
         "estimates": content["estimates"],
-        "sentences": [*told_apart(content), *together(content)],
+        "sentences": [*undetermined(content), *correlated(content)],
         "series": [_series(each, drawn.get(each["name"])) for each in content["series"]],
         "correlation": content["correlation"],
         "profiles": [
@@ -56,17 +56,5 @@ def _series(each: Mapping[str, Any], curve: Any) -> dict[str, Any]:
 
 def _profile(each: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     """A profile as the rise of the squares, the parabola beside it, and the rise at which the interval ends."""
-    values = np.array(own["values"], dtype=np.float64)
-    t = np.array([np.nan if x is None else x for x in own["t"]])
-    known = np.isfinite(t)
-    fine = np.linspace(values[0], values[-1], 81)
-    straight = (fine - each["value"]) / each["deviation"]
-    return {
-        "name": each["name"],
-        "values": values[known].tolist(),
-        "rise": (t[known] ** 2).tolist(),
-        "fine": fine.tolist(),
-        "parabola": (straight**2).tolist(),
-        "between": (np.interp(fine, values[known], t[known]) ** 2).tolist(),
-        "end": float(((each["high"] - each["value"]) / each["deviation"]) ** 2),
-    }
+    curves = profile_curves(each, own)._asdict()
+    return {"name": each["name"], **{key: np.asarray(value).tolist() for key, value in curves.items()}}

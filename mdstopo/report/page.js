@@ -121,7 +121,7 @@
     data.fit.series.forEach((each, k) => {
       if (each.load_case !== state.load) return;
       const colour = COLOURS[k % COLOURS.length], [times, values] = each.curve || [[], []];
-      const c = chart(parent, `${each.name}, measured and fitted`, "time, s", `${each.response}, ${each.unit}`, each.t.concat(m ? m.t : times), each.measured.concat(values));
+      const c = chart(parent, `${each.name}, measured and fitted: ${each.response}`, "time, s", each.unit || "value", each.t.concat(m ? m.t : times), each.measured.concat(values));
       line(c, times, values, colour);
       each.t.forEach((t, i) => element(c.svg, "circle", { cx: c.px(t), cy: c.py(each.measured[i]), r: 2.2, fill: "none", stroke: "#222", class: "measured" }));
       if (m) {
@@ -135,16 +135,16 @@
     });
   };
   const correlation = (parent) => {
-    const names = data.fit.estimates.map((each) => each.name), rows = data.fit.correlation, n = names.length, L = Math.min(250, 34 + 6 * Math.max(...names.map((name) => name.length))), side = Math.min(46, (455 - L) / n), H = n * side + 18;
+    const names = data.fit.estimates.map((each) => each.name), rows = data.fit.correlation, n = names.length, L = 34 + 6 * Math.max(...names.map((name) => name.length)), side = Math.min(46, Math.max(n > 8 ? 14 : 36, (455 - L) / n)), W = Math.max(460, L + n * side + 5), H = n * side + 18;
     if (!rows || n < 2) return;
     parent.appendChild(Object.assign(document.createElement("h2"), { textContent: "how errors of estimates go together: correlations" }));
-    const svg = element(parent, "svg", { viewBox: `0 0 460 ${H}`, role: "img", "aria-label": "correlations of estimates", class: "correlation" });
+    const svg = element(parent, "svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": "correlations of estimates", class: "correlation" });
     rows.forEach((row, i) => {
       element(svg, "text", { x: L - 6, y: (i + 0.5) * side + 4, "text-anchor": "end" }, `${names[i]}  ${i + 1}`);
       element(svg, "text", { x: L + (i + 0.5) * side, y: n * side + 13, "text-anchor": "middle" }, String(i + 1));
       row.forEach((value, j) => {
         element(svg, "rect", { x: L + j * side, y: i * side, width: side - 1, height: side - 1, fill: value === null ? "#f2f2f2" : shade(value * Math.abs(value)) });
-        if (side > 24) element(svg, "text", { x: L + (j + 0.5) * side, y: (i + 0.5) * side + 4, "text-anchor": "middle", style: value !== null && Math.abs(value) > 0.7 ? "fill: #fff" : "" }, value === null ? "-" : value.toFixed(2));
+        if (side > 30) element(svg, "text", { x: L + (j + 0.5) * side, y: (i + 0.5) * side + 4, "text-anchor": "middle", style: value !== null && Math.abs(value) > 0.7 ? "fill: #fff" : "" }, value === null ? "-" : value.toFixed(2));
       });
     });
   };

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case, ResponseRow
+from mdstopo.case.stages import stage_count
 from mdstopo.case.units import unit_of, unit_of_value, words
 from mdstopo.limiting.compare import kept_iterates
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.scenery import Floats
 from mdstopo.plots.source import Source
+from mdstopo.store.result_reader import ResultView
 
 #: samples between the neighbours of the largest sample, to find a peak; members that are listed
 FINE, LISTED = 41, 300
@@ -25,9 +27,12 @@ _PEAKS: dict[str, Callable[[Floats], Floats]] = {
 
 
 def best_iterate(source: Source) -> int | None:
-    """Which iterate of a run is the design of the file: the best that keeps the limits, else the last."""
+    """Which iterate of a run is the design of the file: the best that keeps the limits, else the last.
+
+    None where it is no iterate: of a run that was stopped while sizes were chosen.
+    """
     view, case = source.view, source.case
-    if view.kind != "run" or "iterations/combined" not in view.arrays:
+    if view.kind != "run" or "iterations/combined" not in view.arrays or _among_sizes(case, view):
         return None
     combined = np.asarray(view.array("iterations/combined"), dtype=np.float64)
     kept = kept_iterates(case, view)
@@ -35,6 +40,14 @@ def best_iterate(source: Source) -> int | None:
     if usable.any():
         return int(np.where(usable, combined, np.inf).argmin())
     return len(combined) - 1 if len(combined) else None
+
+
+def _among_sizes(case: Case, view: ResultView) -> bool:
+    """Whether a file has the best sizes so far of a choice that has not come to its end."""
+    best = view.arrays.get("catalogue/search/x")
+    if best is None or not np.isfinite(best).all():
+        return False
+    return int(view.array("iterations/stage").max()) < stage_count(case)
 
 
 def objective_rows(source: Source) -> list[dict[str, Any]]:

@@ -27,7 +27,7 @@ from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.pricing_rounds import Rounds
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
-from mdstopo.session.sizes import Sizes
+from mdstopo.session.sizes import Sizes, excess_at_prices
 from mdstopo.session.start_in_stages import (
     ROUND,
     Marked,
@@ -330,7 +330,8 @@ class _Run:
         starts, earlier = self.case.optimizer.starts, int(view.settings.get("starts", 1))
         known = restore(view, starts)
         self.states = carried_over(self.case, known, earlier)
-        self.sizes.restore(view)
+        best = best_of(self.case, self.states)
+        self.sizes.restore(view, None if best is None else self.states[best])
         again = [str(k + 1) for k in range(starts) if known[k] is not None and self.states[k] is None]
         if again:
             self.notify(
@@ -454,6 +455,8 @@ class _Run:
         }
         if evaluation.status.usable:
             self.constraints = np.asarray(evaluation.constraints, dtype=np.float64)
+            if self.sizes.is_chosen(state):
+                self.constraints = excess_at_prices(self.case, design, self.constraints)
         if evaluation.status.usable and len(self.case.objectives) > 1:
             names = [objective.name for objective in self.case.objectives]
             last = evaluation
@@ -548,16 +551,22 @@ class _Run:
         space = self.case.space
         chosen = self.sizes.best
         design = space.expand(state.best_alpha if chosen is None else chosen)
+        objectives = dict(zip(names, columns["objectives"][best_row(state)].tolist(), strict=True))
+        constraints = columns["constraints"][best_row(state)]
+        if chosen is not None and not self.sizes.is_chosen(state):  # stopped on the way: no iterate has these sizes
+            found = engine.evaluate(design, gradient=False)
+            objectives = dict(found.objectives)
+            constraints = excess_at_prices(self.case, design, np.asarray(found.constraints, dtype=np.float64))
         begun = [each for each in self.states if each is not None]
         begin = first_row(state, 1 if self.sizes.is_chosen(state) else 0)
         return Outcome(
             case=self.case,
             alpha=design[: space.n_alpha],
             variables=space.named(design),
-            objectives=dict(zip(names, columns["objectives"][best_row(state)].tolist(), strict=True)),
+            objectives=objectives,
             initial_objectives=dict(zip(names, columns["objectives"][begin].tolist(), strict=True)),
             peaks=self.peaks,
-            constraints=columns["constraints"][best_row(state)] if self.constraints is None else self.constraints,
+            constraints=constraints if self.constraints is None else self.constraints,
             utopia=self.combining.utopia,
             maxima=self.combining.maxima,
             combined=float(state.best_objective) if len(names) > 1 else None,

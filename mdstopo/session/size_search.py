@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 
 #: so many choices are all evaluated, where nothing varies beside them
 FEW = 1000
-#: evaluations after which the search ends with the best so far, and what it has not looked into
+#: evaluations after which the search ends with the best so far, and says that nodes are left
 MOST_EVALUATIONS = 50_000
 #: how near to a size, as a share of the way to the next one, a number counts as it
 AT_A_SIZE = 1e-6
@@ -41,7 +41,7 @@ EXCHANGES = 2500
 BEGINNINGS = 8
 
 
-class Sold(NamedTuple):
+class Catalogued(NamedTuple):
     """Variables with a catalogue.
 
     place (k,): which of x (n,) they are. sizes, prices: of each, rising.
@@ -53,8 +53,15 @@ class Sold(NamedTuple):
 
     def at(self, x: Floats, choice: Ints) -> Floats:
         """x with the sizes that are chosen (k,)."""
+        return self._with(self.sizes, x, choice)
+
+    def paid(self, x: Floats, choice: Ints) -> Floats:
+        """x with the prices of these sizes."""
+        return self._with(self.prices, x, choice)
+
+    def _with(self, offered: tuple[Floats, ...], x: Floats, choice: Ints) -> Floats:
         out = x.copy()
-        out[self.place] = [sizes[i] for sizes, i in zip(self.sizes, choice.tolist(), strict=True)]
+        out[self.place] = [each[i] for each, i in zip(offered, choice.tolist(), strict=True)]
         return out
 
     @property
@@ -118,14 +125,14 @@ class Found:
     exchanged: bool = False
 
 
-def rows_for_sizes(rows: LinearRows, sold: Sold) -> LinearRows:
+def rows_for_sizes(rows: LinearRows, catalogued: Catalogued) -> LinearRows:
     """The linear rows that a choice has to keep.
 
     A sum that is to be equal can seldom be met by sizes. It must not be exceeded, and must not fall short by more than
     the largest step from one size of one member to the next.
     """
-    weights = np.abs(rows.A[:, sold.place])
-    steps = np.array([np.diff(prices).max(initial=0.0) for prices in sold.prices])
+    weights = np.abs(rows.A[:, catalogued.place])
+    steps = np.array([np.diff(prices).max(initial=0.0) for prices in catalogued.prices])
     split = rows.equal & (weights.max(axis=1, initial=0.0) > 0.0)
     short = (weights * steps).max(axis=1, initial=0.0)
     return LinearRows(
@@ -141,26 +148,26 @@ class SizeSearch:
     def __init__(
         self,
         problem: Problem,
-        sold: Sold,
+        catalogued: Catalogued,
         x: Floats,
         solve: Callable[[Problem, Floats], State],
         tolerance: float,
     ) -> None:
         """Begin at the continuous optimum x (n,).
 
-        problem: of all variables; those that are sold but not in `sold` are where they stay, in its bounds.
-        sold: the variables whose sizes are chosen.
+        problem: of all variables; those with a catalogue that are not in `catalogued` are held by its bounds.
+        catalogued: the variables whose sizes are chosen.
         solve: optimises a problem from a design on.
         tolerance: relative; a node has to promise so much more than the best choice.
         """
         self._counts = [0]
-        self._sold, self._solve, self._tolerance = sold, solve, tolerance
-        self._rows = rows_for_sizes(problem.linear, sold)
+        self._catalogued, self._solve, self._tolerance = catalogued, solve, tolerance
+        self._rows = rows_for_sizes(problem.linear, catalogued)
         self._problem = problem
-        self._others = np.setdiff1d(np.flatnonzero(problem.upper > problem.lower), sold.place)
+        self._others = np.setdiff1d(np.flatnonzero(problem.upper > problem.lower), catalogued.place)
         self.found = Found()
-        k = len(sold.place)
-        last = np.array([len(sizes) - 1 for sizes in sold.sizes], dtype=np.int64)
+        k = len(catalogued.place)
+        last = np.array([len(sizes) - 1 for sizes in catalogued.sizes], dtype=np.int64)
         self._open = [Node(float("-inf"), 0, np.zeros(k, dtype=np.int64), last, x.copy())]
         self._made = 1
         self._start = x
@@ -174,22 +181,22 @@ class SizeSearch:
     def run(self, stop: Callable[[], bool], keep: Callable[[Found], None]) -> Found:
         """Search on until nothing is left, or stop() says so; keep sees what has been found after each node."""
         found = self.found
-        if self._sold.choices <= FEW and not len(self._others):
+        if self._catalogued.choices <= FEW and not len(self._others):
             self._try_all(stop)
         while self._open and not found.exhaustive and not stop() and self._counts[0] < MOST_EVALUATIONS:
             node = heapq.heappop(self._open)
             if node.bound < self._cutoff():
-                self._look_into(node)
+                self._branch(node)
                 found.nodes += 1
-            self._tell()
+            self._update()
             keep(found)
         if not self._open and not found.exhaustive and not self._refined:
             self._refined = self._refine(stop)
-        self._tell()
+        self._update()
         keep(found)
         return found
 
-    def _tell(self) -> None:
+    def _update(self) -> None:
         self.found.evaluations = self._counts[0]
         least = min((node.bound for node in self._open), default=float("inf"))
         self.found.finished = not self._open and (self._refined or self.found.exhaustive)
@@ -200,7 +207,7 @@ class SizeSearch:
         return best - self._tolerance * abs(best) if np.isfinite(best) else best
 
     def _try_all(self, stop: Callable[[], bool]) -> None:
-        ranges = [range(len(sizes)) for sizes in self._sold.sizes]
+        ranges = [range(len(sizes)) for sizes in self._catalogued.sizes]
         for choice in product(*ranges):
             if stop():
                 return
@@ -208,7 +215,7 @@ class SizeSearch:
         self._open = []
         self.found.exhaustive = True
 
-    def _look_into(self, node: Node) -> None:
+    def _branch(self, node: Node) -> None:
         """Solve the relaxation of a node, try what is near its optimum, and open what is behind it."""
         relaxed = self._relaxed(node)
         state = self._solved(relaxed, node.x)
@@ -217,14 +224,14 @@ class SizeSearch:
         x, value = state.best_alpha, float(state.best_objective)
         slope = state.gradients[0] if len(state.gradients) else np.zeros(len(x))
         self._try_near(node, x, slope)
-        if value >= self._cutoff():
+        if value >= self._cutoff() or not len(node.low):
             return
-        away = [
-            self._away(x[place], sizes)
-            for place, sizes in zip(self._sold.place.tolist(), self._sold.sizes, strict=True)
+        off = [
+            self._off_size(x[place], sizes)
+            for place, sizes in zip(self._catalogued.place.tolist(), self._catalogued.sizes, strict=True)
         ]
-        most = int(np.argmax([share for share, _ in away]))
-        share, below = away[most]
+        most = int(np.argmax([share for share, _ in off]))
+        share, below = off[most]
         if share <= AT_A_SIZE:
             choice = np.clip(self._nearest(x), node.low, node.high)
             if self._excess(choice, x) <= 0.0:
@@ -248,7 +255,7 @@ class SizeSearch:
         """The better optimum of a relaxation, from a design on and from the middle; None where none keeps the rows."""
         found: list[State] = []
         middle = x.copy()
-        middle[self._sold.place] = 0.5 * (relaxed.lower + relaxed.upper)[self._sold.place]
+        middle[self._catalogued.place] = 0.5 * (relaxed.lower + relaxed.upper)[self._catalogued.place]
         for start in (x, middle):
             try:
                 begin = project(
@@ -265,9 +272,9 @@ class SizeSearch:
         """The problem of a node: any number within its ranges, at the least price that sizes there allow."""
         lower, upper = self._problem.lower.copy(), self._problem.upper.copy()
         slope, offset = np.ones((len(self._rows), len(lower))), np.zeros((len(self._rows), len(lower)))
-        for k, place in enumerate(self._sold.place.tolist()):
+        for k, place in enumerate(self._catalogued.place.tolist()):
             i, j = int(node.low[k]), int(node.high[k])
-            sizes, prices = self._sold.sizes[k][i : j + 1], self._sold.prices[k][i : j + 1]
+            sizes, prices = self._catalogued.sizes[k][i : j + 1], self._catalogued.prices[k][i : j + 1]
             lower[place], upper[place] = sizes[0], sizes[-1]
             steps = (prices[1:] - prices[0]) / (sizes[1:] - sizes[0])
             for r in range(len(self._rows)):
@@ -280,7 +287,7 @@ class SizeSearch:
 
     # -- choices
 
-    def _away(self, value: float, sizes: Floats) -> tuple[float, int]:
+    def _off_size(self, value: float, sizes: Floats) -> tuple[float, int]:
         """How far a number is from its nearest size, as a share of the way between the two beside it; the lower one."""
         below = int(np.clip(np.searchsorted(sizes, value, side="right") - 1, 0, max(len(sizes) - 2, 0)))
         if len(sizes) == 1:
@@ -289,19 +296,19 @@ class SizeSearch:
         return float(min(abs(share), abs(1.0 - share))), below
 
     def _nearest(self, x: Floats) -> Ints:
-        pairs = zip(self._sold.place.tolist(), self._sold.sizes, strict=True)
+        pairs = zip(self._catalogued.place.tolist(), self._catalogued.sizes, strict=True)
         return np.array([int(np.abs(sizes - x[place]).argmin()) for place, sizes in pairs], dtype=np.int64)
 
     def _try_near(self, node: Node, x: Floats, slope: Floats) -> None:
         """Try the nearest sizes, made to keep the rows by what costs least, and then what else there is room for."""
         choice = np.clip(self._nearest(x), node.low, node.high)
-        gains = slope[self._sold.place]
-        if not self._mend(choice, x, gains):
+        gains = slope[self._catalogued.place]
+        if not self._repair(choice, x, gains):
             return
         while True:
             up = []
             for k, i in enumerate(choice.tolist()):
-                if i + 1 < len(self._sold.sizes[k]) and gains[k] < 0.0:
+                if i + 1 < len(self._catalogued.sizes[k]) and gains[k] < 0.0:
                     choice[k] += 1
                     if self._excess(choice, x) <= 0.0:
                         up.append((self._loss(k, i, i + 1, gains), k))
@@ -311,17 +318,17 @@ class SizeSearch:
             choice[min(up)[1]] += 1
         self._try(choice, x)
 
-    def _mend(self, choice: Ints, x: Floats, gains: Floats) -> bool:
+    def _repair(self, choice: Ints, x: Floats, gains: Floats) -> bool:
         """Change a choice, one size at a time by what costs least, until it keeps the rows; whether it does."""
-        for _ in range(2 * sum(map(len, self._sold.sizes)) + 1):
+        for _ in range(2 * sum(map(len, self._catalogued.sizes)) + 1):
             missed = self._missed(choice, x)
             if not missed.max(initial=0.0) > 0.0:
                 return True
-            row = self._rows.A[int(missed.argmax()), self._sold.place]
+            row = self._rows.A[int(missed.argmax()), self._catalogued.place]
             moves = []
             for k, i in enumerate(choice.tolist()):
                 by = -1 if row[k] > 0.0 else 1
-                if row[k] != 0.0 and 0 <= i + by < len(self._sold.sizes[k]):
+                if row[k] != 0.0 and 0 <= i + by < len(self._catalogued.sizes[k]):
                     moves.append((self._loss(k, i, i + by, gains), k, by))
             if not moves:
                 return False
@@ -331,10 +338,10 @@ class SizeSearch:
 
     def _loss(self, k: int, i: int, j: int, gains: Floats) -> float:
         """What going from size i to j of variable k does to the objective, to first order, by what it saves."""
-        sizes, prices = self._sold.sizes[k], self._sold.prices[k]
+        sizes, prices = self._catalogued.sizes[k], self._catalogued.prices[k]
         change = float(gains[k]) * float(sizes[j] - sizes[i])
         saved = abs(float(prices[j] - prices[i]))
-        weight = float(np.abs(self._rows.A[:, self._sold.place[k]]).max(initial=0.0)) * saved
+        weight = float(np.abs(self._rows.A[:, self._catalogued.place[k]]).max(initial=0.0)) * saved
         return change / weight if weight > 0.0 else change
 
     def _excess(self, choice: Ints, x: Floats) -> float:
@@ -343,8 +350,7 @@ class SizeSearch:
 
     def _missed(self, choice: Ints, x: Floats) -> Floats:
         """(m,) by how much each row is missed, beyond rounding."""
-        paid = x.copy()
-        paid[self._sold.place] = [prices[i] for prices, i in zip(self._sold.prices, choice.tolist(), strict=True)]
+        paid = self._catalogued.paid(x, choice)
         miss = self._rows.excess(paid)
         miss = np.where(self._rows.equal, 0.0, miss)
         size = np.abs(self._rows.A) @ np.abs(paid) + np.abs(self._rows.b)
@@ -359,14 +365,14 @@ class SizeSearch:
         if len(self._others):
             fixed = self._relaxed(Node(0.0, 0, choice, choice, x))
             try:
-                begin = project(self._sold.at(x, choice), fixed.lower, fixed.upper, fixed.linear)
+                begin = project(self._catalogued.at(x, choice), fixed.lower, fixed.upper, fixed.linear)
             except InfeasibleRows:
                 return False
             state = self._solve(fixed, begin)
             value, violation, there = state.best_objective, state.best_violation, state.best_alpha
         else:
             self._counts[0] += 1
-            there = self._sold.at(x, choice)
+            there = self._catalogued.at(x, choice)
             sample = self._problem.evaluate(there, gradient=False)
             usable = sample.status.usable and np.isfinite(sample.objective)
             value = sample.objective if usable else float("inf")
@@ -383,22 +389,22 @@ class SizeSearch:
         """Go downhill from the best choices that were met, to better neighbours; whether it came to its end."""
         usable = [(value, key) for key, value in self._known.items() if np.isfinite(value)]
         for value, key in sorted(usable)[: 1 if len(self._others) else BEGINNINGS]:
-            at, height = np.array(key, dtype=np.int64), value
-            lower = True
-            while lower and self._counts[0] < MOST_EVALUATIONS:
-                lower = False
+            at, least = np.array(key, dtype=np.int64), value
+            improved = True
+            while improved and self._counts[0] < MOST_EVALUATIONS:
+                improved = False
                 for choice in self._neighbours(at):
                     if stop():
                         return False
                     self.found.exchanged |= self._try(choice, self._start if self.found.x is None else self.found.x)
                     there = self._known.get(tuple(choice.tolist()), float("inf"))
-                    if there < height:
-                        at, height, lower = choice, there, True
+                    if there < least:
+                        at, least, improved = choice, there, True
         return True
 
     def _neighbours(self, choice: Ints) -> Iterator[Ints]:
         k = len(choice)
-        last = np.array([len(sizes) - 1 for sizes in self._sold.sizes])
+        last = np.array([len(sizes) - 1 for sizes in self._catalogued.sizes])
         moves = [[(i, 1)] for i in range(k)] + [[(i, -1)] for i in range(k)]
         if k * k <= EXCHANGES and not len(self._others):
             moves += [[(i, 1), (j, -1)] for i in range(k) for j in range(k) if i != j]
@@ -413,8 +419,11 @@ class SizeSearch:
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Everything that a later process needs to go on, by name."""
-        found, k, n = self.found, len(self._sold.place), len(self._start)
+        found, k, n = self.found, len(self._catalogued.place), len(self._start)
         nodes = sorted(self._open)
+        numbers = (
+            found.objective, found.nodes, self._counts[0], self._made, self._refined, found.exchanged, found.exhaustive,
+        )  # fmt: skip
         return {
             "open_bound": np.array([node.bound for node in nodes], dtype=np.float64),
             "open_number": np.array([node.number for node in nodes], dtype=np.int64),
@@ -425,10 +434,8 @@ class SizeSearch:
             "x": np.full(n, np.nan) if found.x is None else found.x,
             "tried": np.array(list(self._known), dtype=np.int64).reshape(len(self._known), k),
             "values": np.array(list(self._known.values()), dtype=np.float64),
-            "numbers": np.array(
-                [found.objective, found.nodes, self._counts[0], self._made, self._refined, found.exchanged],
-                dtype=np.float64,
-            ),
+            "numbers": np.array(numbers, dtype=np.float64),
+            "place": self._catalogued.place,
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -439,12 +446,27 @@ class SizeSearch:
             for bound, number, low, high, x in zip(*columns, strict=True)
         ]
         heapq.heapify(self._open)
-        objective, nodes, evaluations, made, refined, exchanged = arrays["numbers"].tolist()
-        self._counts[0], self._made, self._refined = int(evaluations), int(made), bool(refined)
+        _, _, _, made, refined, _, _ = arrays["numbers"].tolist()
+        self._made, self._refined = int(made), bool(refined)
         tried = map(tuple, np.asarray(arrays["tried"]).tolist())
         self._known = dict(zip(tried, np.asarray(arrays["values"]).tolist(), strict=True))
-        known = arrays["choice"].min(initial=0) >= 0
-        self.found = Found(
-            np.array(arrays["choice"]) if known else None, np.array(arrays["x"]) if known else None, float(objective),
-            int(nodes), int(evaluations), exchanged=bool(exchanged),
-        )  # fmt: skip
+        self.found = found_in(arrays)
+        self._counts[0] = self.found.evaluations
+
+
+def found_in(arrays: Mapping[str, NDArray[Any]]) -> Found:
+    """What a search had found that `to_arrays` has kept. Raises KeyError or ValueError where something is missing."""
+    objective, nodes, evaluations, _, refined, exchanged, exhaustive = arrays["numbers"].tolist()
+    known = bool(np.isfinite(arrays["x"]).all())
+    bounds = arrays["open_bound"]
+    return Found(
+        choice=np.array(arrays["choice"]) if known else None,
+        x=np.array(arrays["x"]) if known else None,
+        objective=float(objective),
+        nodes=int(nodes),
+        evaluations=int(evaluations),
+        bound=float(min(bounds.min(initial=np.inf), objective)),
+        finished=not len(bounds) and bool(refined or exhaustive),
+        exhaustive=bool(exhaustive),
+        exchanged=bool(exchanged),
+    )

@@ -1,6 +1,7 @@
 """The last stage of a run whose case has a catalogue: the sizes of the members that are kept (`size_search`)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -8,16 +9,16 @@ from numpy.typing import NDArray
 
 from mdstopo.case.catalogue import has_catalogue
 from mdstopo.case.errors import CaseError
-from mdstopo.case.model import Case
+from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.stages import stage_count
 from mdstopo.case.words import count_text
 from mdstopo.optimizer.interface import run as run_optimizer
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.state import State
-from mdstopo.scene.moving_volumes import moves
+from mdstopo.scene.moving_volumes import moves, moving_volumes, spent
 from mdstopo.session.outcome import ChosenSizes
-from mdstopo.session.size_search import MOST_EVALUATIONS, Found, SizeSearch, Sold, Within
-from mdstopo.session.start_in_stages import STAGE, Marked, continued, stage_of
+from mdstopo.session.size_search import MOST_EVALUATIONS, Catalogued, Found, SizeSearch, Within, found_in
+from mdstopo.session.start_in_stages import STAGE, Marked, continued, has_sizes
 from mdstopo.starts.single_start import make_optimizer
 from mdstopo.status import RunStatus
 from mdstopo.store.contents import Datasets, design_part
@@ -47,19 +48,38 @@ class Sizes:
 
     def refuse(self) -> None:
         """Refuse what no sizes can be chosen for. Raises CaseError."""
-        wrong = [group.name for group in self.case.design_groups if group.sizes and moves(self.case, group)]
-        if wrong and any(hasattr(row, "coefficients") for row in self.case.constraints):
-            message = f"the members of {wrong[0]!r} cost a length that varies; sizes are chosen for lengths that stay"
-            place = self.case.marks.mistake(f"design.catalogue.{wrong[0]}", message)
-            raise CaseError([place], str(self.case.path or self.case.name))
+        case = self.case
+        varying = [case.constraints[i] for i in moving_volumes(case)]
+        for group in case.design_groups:
+            rows = [row for row in varying if isinstance(row, VolumeRow) and group.name in row.groups]
+            if not (group.sizes and rows):
+                continue
+            if moves(case, group):
+                why = f"the members of {group.name!r} cost a length that varies; sizes are chosen for lengths that stay"
+            elif group.prices != group.sizes:
+                why = f"a volume row sums {group.name!r} and lengths that vary; there prices have to be the sizes"
+            else:
+                continue
+            place = case.marks.mistake(f"design.catalogue.{group.name}", why)
+            raise CaseError([place], str(case.path or case.name))
 
-    def restore(self, view: ResultView) -> None:
-        """Take up what an earlier process has found."""
-        self._before = view if f"{SEARCH}/numbers" in view.arrays else None
+    def restore(self, view: ResultView, state: State | None) -> None:
+        """Take up what an earlier process has found; state: the best one, where there is one."""
+        if f"{SEARCH}/numbers" not in view.arrays:
+            return
+        self._before = view
+        if state is None or not self.is_chosen(state):
+            return
+        with _whole(view):
+            arrays = view.under(SEARCH)
+            found, catalogued = found_in(arrays), self._catalogued(arrays["place"].tolist())
+            self._continuous = self._sign * float(view.array(f"{CATALOGUE}/continuous"))
+        self._kept = len(catalogued.place)
+        self.outcome = self._outcome(found, catalogued)
 
     def is_chosen(self, state: State) -> bool:
         """Whether a state is that of the sizes chosen."""
-        return self.asked and stage_of(state) >= stage_count(self.case)
+        return has_sizes(self.case, state)
 
     def choose(
         self,
@@ -77,36 +97,40 @@ class Sizes:
         keep: called whenever there is something to save.
         notify: is given sentences for the user.
         """
-        held, sold = self._sold(problem, state.best_alpha)
-        self._continuous, self._kept = float(state.best_objective), len(sold.place)
-        search = SizeSearch(held, sold, held.initial, self._solve, self.case.optimizer.tolerance)
+        held, catalogued = self._held(problem, state.best_alpha)
+        self._continuous, self._kept = float(state.best_objective), len(catalogued.place)
+        search = SizeSearch(held, catalogued, held.initial, self._solve, self.case.optimizer.tolerance)
         self._search = search
         if self._before is not None:
-            try:
+            with _whole(self._before):
                 search.restore(self._before.under(SEARCH))
-            except (KeyError, ValueError, TypeError) as error:
-                raise DamagedError(
-                    f"{self._before.path}: damaged: the search for sizes is not whole ({error})"
-                ) from error
-        of = count_text(int(self._members().sum()))
-        notify(f"choosing sizes of {len(sold.place)} members of {of}, {count_text(sold.choices)} choices")
+        of = count_text(sum(len(group) for group in self.case.design_groups if group.sizes))
+        notify(f"choosing sizes of {self._kept} members of {of}, {count_text(catalogued.choices)} choices")
 
-        def tell(found: Found) -> None:
-            self.outcome = self._outcome(found, sold)
+        def save(found: Found) -> None:
+            self.outcome = self._outcome(found, catalogued)
             keep()
 
-        found = search.run(stop, tell)
-        self.outcome = self._outcome(found, sold)
+        found = search.run(stop, save)
+        self.outcome = self._outcome(found, catalogued)
         if (not found.finished and stop()) or found.x is None:
             return state
+        return self._end(problem, state, found.x, found)
+
+    def _end(self, problem: Problem, state: State, x: Floats, found: Found) -> State:
+        """The last state of a run: of the choice x (n,), behind that of the continuous optimum."""
         # its sizes have been checked at their prices, and it does not move: rows that are free of bounds hold it
         rows = problem.linear
         free = replace(
             rows, b=np.full(len(rows), np.abs(rows.A).sum() + np.abs(rows.b).sum()), equal=rows.equal & False
         )
-        marked = Marked(Within(problem, [0], found.x, found.x, free), STAGE, stage_count(self.case))
-        last = continued(state, make_optimizer(self.case, marked).start(found.x))
-        last.history.constraints[-1] = rows.excess(found.x)
+        marked = Marked(Within(problem, [0], x, x, free), STAGE, stage_count(self.case))
+        last = continued(state, make_optimizer(self.case, marked).start(x))
+        space = self.case.space
+        design = space.expand(x)
+        last.history.constraints[-1] = rows.excess(space.reduce(at_prices(self.case, design)))
+        for row in last.history.info.get("constraints", [])[-1:]:
+            row[:] = excess_at_prices(self.case, design, row)
         last.evaluations += found.evaluations
         last.history.evaluations[-1] += found.evaluations
         # a choice is no optimum of numbers: no residual tells how far it is from one
@@ -127,8 +151,8 @@ class Sizes:
 
     def part(self) -> Datasets:
         """What a file keeps of the search, and before its end the best choice as the design."""
-        if self._search is None:
-            return {}
+        if self._search is None:  # of a run that is opened again: as it was
+            return {} if self._before is None else _kept(self._before)
         found = self._search.found
         part: Datasets = {f"{SEARCH}/{name}": array for name, array in self._search.to_arrays().items()}
         part[f"{CATALOGUE}/continuous"] = np.array(self._sign * self._continuous)
@@ -149,39 +173,46 @@ class Sizes:
         """-1 where the objective is to be maximised, and so U is its negative."""
         return -1.0 if self.case.objectives[0].sense == "maximize" else 1.0
 
-    def _members(self) -> NDArray[np.bool_]:
-        """(N,) which design members have a catalogue."""
-        groups = self.case.design_groups
-        return np.repeat([bool(group.sizes) for group in groups], [len(group) for group in groups])
-
-    def _sold(self, problem: Problem, x: Floats) -> tuple[Within, Sold]:
+    def _held(self, problem: Problem, x: Floats) -> tuple[Within, Catalogued]:
         """The problem with members that are not kept at their least size, and the variables of the others."""
+        lower, upper, begin = problem.lower.copy(), problem.upper.copy(), x.copy()
+        kept = []
+        for place, group in self._groups_at().items():
+            positive = [size for size in group.sizes if size > 0.0]
+            if positive and x[place] < KEPT * positive[0]:
+                lower[place] = upper[place] = begin[place] = group.sizes[0]
+            elif positive:
+                kept.append(place)
+        held = Within(problem, [0], lower, upper, problem.linear)
+        held.initial = begin
+        return held, self._catalogued(sorted(kept))
+
+    def _groups_at(self) -> dict[int, MemberGroup]:
+        """Of each variable with a catalogue, by its place in x: a group that it is of."""
         space = self.case.space
         # alpha i is x[slot i]: seen by expanding the places
         slots = space.expand(np.arange(space.size, dtype=np.float64))[: space.n_alpha].astype(np.int64)
-        lower, upper, begin = problem.lower.copy(), problem.upper.copy(), x.copy()
-        places: dict[int, tuple[Floats, Floats]] = {}
-        for group in self.case.design_groups:
-            sizes, prices = np.array(group.sizes), np.array(group.prices)
-            positive = sizes[sizes > 0.0]
-            if not len(positive):
-                continue
-            for place in np.unique(slots[self.case.group_slices[group.name]]).tolist():
-                if x[place] < KEPT * positive[0]:
-                    lower[place] = upper[place] = begin[place] = sizes[0]
-                else:
-                    places[place] = sizes, prices
-        order = sorted(places)
-        sold = Sold(np.array(order, dtype=np.int64), *(tuple(places[p][k] for p in order) for k in range(2)))
-        held = Within(problem, [0], lower, upper, problem.linear)
-        held.initial = begin
-        return held, sold
+        return {
+            place: group
+            for group in self.case.design_groups
+            if group.sizes
+            for place in np.unique(slots[self.case.group_slices[group.name]]).tolist()
+        }
+
+    def _catalogued(self, places: Sequence[int]) -> Catalogued:
+        """Variables with their sizes and prices. places: in x."""
+        groups = self._groups_at()
+        return Catalogued(
+            np.array(places, dtype=np.int64),
+            tuple(np.array(groups[place].sizes) for place in places),
+            tuple(np.array(groups[place].prices) for place in places),
+        )
 
     def _solve(self, problem: Problem, x: Floats) -> State:
         optimizer = make_optimizer(self.case, problem)
         return run_optimizer(optimizer, optimizer.start(x))
 
-    def _outcome(self, found: Found, sold: Sold) -> ChosenSizes:
+    def _outcome(self, found: Found, catalogued: Catalogued) -> ChosenSizes:
         sign, chosen = self._sign, {}
         if found.x is not None:
             design = self.case.space.expand(found.x)
@@ -192,7 +223,7 @@ class Sizes:
                         size: int(np.count_nonzero(np.abs(own - size) <= 1e-12)) for size in group.sizes
                     }
         return ChosenSizes(
-            members=self._kept, choices=sold.choices, objective=sign * found.objective,
+            members=self._kept, choices=catalogued.choices, objective=sign * found.objective,
             continuous=sign * self._continuous, bound=sign * found.bound, nodes=found.nodes,
             evaluations=found.evaluations, exhaustive=found.exhaustive, exchanged=found.exchanged,
             finished=found.finished, sizes=chosen,
@@ -213,6 +244,20 @@ class Sizes:
         )
 
 
+@contextmanager
+def _whole(view: ResultView) -> Iterator[None]:
+    """What is missing in a file, or of another kind, is damage of the file."""
+    try:
+        yield
+    except (KeyError, ValueError, TypeError, IndexError) as error:
+        raise DamagedError(f"{view.path}: damaged: the search for sizes is not whole ({error})") from error
+
+
+def _kept(view: ResultView) -> Datasets:
+    """What a file has of a choice of sizes."""
+    return {f"{CATALOGUE}/{name}": array for name, array in view.under(CATALOGUE).items()}
+
+
 def at_prices(case: Case, design: Floats) -> Floats:
     """A design (N + P,) of chosen sizes with their prices in the place of alpha: what volume rows sum up."""
     paid = design.copy()
@@ -221,3 +266,14 @@ def at_prices(case: Case, design: Floats) -> Floats:
         for size, price in zip(group.sizes, group.prices, strict=True):
             paid[case.group_slices[group.name]][own == size] = price
     return paid
+
+
+def excess_at_prices(case: Case, design: Floats, excess: Floats) -> Floats:
+    """h - h0 (n_con,) of all constraints with volume rows at the prices of chosen sizes; excess: at the sizes."""
+    paid = at_prices(case, design)
+    return np.array(
+        [
+            spent(case, row, paid) - row.bound if isinstance(row, VolumeRow) else value
+            for row, value in zip(case.constraints, excess.tolist(), strict=True)
+        ]
+    )

@@ -52,6 +52,11 @@ def is_done(case: Case, state: State) -> bool:
     return last and not state.running
 
 
+def has_sizes(case: Case, state: State) -> bool:
+    """Whether sizes from the case's catalogue have been chosen: this counts as one more stage, behind the last."""
+    return has_catalogue(case) and stage_of(state) >= stage_count(case)
+
+
 def furthest(states: "list[State | None]") -> "list[State | None]":
     """The states that may be compared: None for those that are in an earlier stage than others.
 
@@ -85,6 +90,8 @@ def run_stages(
 
     Returns the last state; None where the start was stopped before it had one.
     """
+    if state is not None and has_sizes(case, state):
+        return state
     count = stage_count(case)
     if count == 1:
         # where sizes are chosen afterwards the history says from the start which stage an iterate belongs to

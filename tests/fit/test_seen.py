@@ -16,6 +16,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.fit.problem import FitProblem
 from mdstopo.fit.record import FitFile, content
 from mdstopo.fit.run_fit import FitRun, run_fit
+from mdstopo.plots.fit_plot import folded
 from mdstopo.plots.plot_table import fitting
 from mdstopo.plots.source import Source
 from mdstopo.report import report_content
@@ -123,6 +124,15 @@ def test_all_pictures_are_drawn(fitted: Path, tmp_path: Path) -> None:
         assert {"fit": "moon", "correlation": "delay of earth", "profiles": "offset of moon"}.get(name, "") in text
 
 
+def test_long_names_are_written_in_lines_that_have_room() -> None:
+    name = "load_cases.in_the_laboratory.loads[0].moment.parameters.amplitude of the first test"
+    lines = folded(name, 30).split("\n")
+    assert "".join(lines).replace(" ", "") == name.replace(" ", "")
+    assert max(map(len, lines)) <= 30
+    assert all(line[-1] in "_." for line in lines[:-1] if " " not in line)
+    assert folded("angle of arm, rad", 30) == "angle of arm, rad"
+
+
 def test_the_fitted_curve_is_what_the_instrument_would_record(fitted: Path) -> None:
     data = report_content.content(Source(fitted))["fit"]
     value = {each["name"]: each["value"] for each in data["estimates"]}
@@ -158,7 +168,7 @@ def test_the_page_shows_all_of_it(fitted: Path, tmp_path: Path) -> None:
     assert seen["charts"] == 8  # a series and its residuals, correlations, five profiles
     assert seen["rows"] == [6, 3]
     assert "NaN" not in seen["ticks"]
-    assert seen["heads"][:2] == ["moon, measured and fitted", "moon, what is left"]
+    assert seen["heads"][:2] == ["moon, measured and fitted: displacement y of stone", "moon, what is left"]
 
 
 def test_tables_have_estimates_series_and_what_was_tried(fitted: Path, tmp_path: Path) -> None:

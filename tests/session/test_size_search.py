@@ -7,7 +7,7 @@ import pytest
 
 from mdstopo.optimizer.interface import make, run
 from mdstopo.optimizer.problem import LinearRows, Sample
-from mdstopo.session.size_search import FEW, SizeSearch, Sold, Within
+from mdstopo.session.size_search import FEW, Catalogued, SizeSearch, Within
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import Status
 
@@ -41,8 +41,8 @@ def search_of(problem, sizes, prices=None, others=0):
     n = len(problem.initial) - others
     begin = solve(problem, problem.initial).best_alpha
     own = tuple(np.array(sizes) for _ in range(n))
-    sold = Sold(np.arange(n), own, own if prices is None else tuple(np.array(prices) for _ in range(n)))
-    return SizeSearch(problem, sold, begin, solve, 1e-8)
+    catalogued = Catalogued(np.arange(n), own, own if prices is None else tuple(np.array(prices) for _ in range(n)))
+    return SizeSearch(problem, catalogued, begin, solve, 1e-8)
 
 
 def brute(problem, sizes, prices=None):
@@ -130,6 +130,22 @@ def test_nothing_is_chosen_where_no_choice_keeps_the_rows():
     assert found.finished
     assert found.x is None
     assert found.objective == np.inf
+
+
+def test_a_search_ends_where_no_member_is_kept_and_another_optimum_is_met():
+    problem, calls = Springs(5, 4, 0.5), []
+
+    def solve_anew(within, x):
+        state = solve(within, x)
+        calls.append(state.best_objective)
+        if len(calls) == 3:  # behind both of the relaxation: that of the one choice there is
+            state.best_objective *= 1.01
+        return state
+
+    none = Catalogued(np.zeros(0, dtype=np.int64), (), ())
+    found = SizeSearch(problem, none, problem.initial, solve_anew, 1e-8).run(never, nothing)
+    assert found.finished
+    assert found.objective == 1.01 * calls[2]
 
 
 def test_a_limit_that_is_no_line_is_kept():

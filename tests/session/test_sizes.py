@@ -9,6 +9,8 @@ import pytest
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
+from mdstopo.plots.source import Source
+from mdstopo.report.report_tables import constraint_rows, objective_rows
 from mdstopo.session.run_session import run_session
 from mdstopo.status import RunStatus
 from mdstopo.store.result_reader import read_result
@@ -34,6 +36,7 @@ constraints:
   - {volume: all, limit: 3.5}
 solver: {tolerance: 1e-8}
 """
+PRICED = "{sizes: [0, 0.4, 1], prices: [0, 0.6, 1]}"
 
 
 def case_with(sizes, **changes):
@@ -57,6 +60,11 @@ def brute(case, outcome, sizes, paid=None):
             if value < best:
                 best, at = value, design.tolist()
     return best, at
+
+
+def paid_by(outcome):
+    """What the straps of a design cost, with the prices of PRICED."""
+    return sum({0.0: 0.0, 0.4: 0.6, 1.0: 1.0}[size] for size in outcome.alpha.tolist())
 
 
 def kept_of(outcome, sizes):
@@ -89,11 +97,39 @@ def test_the_sizes_of_a_run_are_the_best_of_all_choices(few, tmp_path, monkeypat
 
 
 def test_prices_bound_the_choice(tmp_path):
-    case = case_with("{sizes: [0, 0.4, 1], prices: [0, 0.6, 1]}")
-    outcome = run_session(case)
+    case = case_with(PRICED)
+    outcome = run_session(case, path=tmp_path / "r.h5")
     best, at = brute(case, outcome, [0.0, 0.4, 1.0], [0.0, 0.6, 1.0])
     assert outcome.objectives["G"] == pytest.approx(best, rel=1e-9)
     assert outcome.alpha.tolist() == at
+    excess = paid_by(outcome) - 3.5
+    assert outcome.constraints.tolist() == pytest.approx([excess], abs=1e-12)
+    source = Source(tmp_path / "r.h5")
+    assert source.view.array("iterations/constraints")[-1] == pytest.approx([excess], abs=1e-12)
+    # the page has the design with its sizes, not the continuous optimum, which is better
+    assert objective_rows(source)[0]["best"] == outcome.objectives["G"]
+    assert constraint_rows(source)[0]["best"] == pytest.approx(excess + 3.5, abs=1e-12)
+
+
+def test_prices_count_beside_limits_on_responses(tmp_path):
+    limit = "limit: 3.5}\n  - {response: {angle: {body: crate}}, over_time: max_abs, limit: 3}"
+    outcome = run_session(case_with(PRICED, replace=[("limit: 3.5}", limit)]), path=tmp_path / "r.h5")
+    assert outcome.constraints[0] == pytest.approx(paid_by(outcome) - 3.5, abs=1e-12)
+    last = read_result(tmp_path / "r.h5").array("iterations/constraints")[-1]
+    assert last.tolist() == pytest.approx(outcome.constraints.tolist(), abs=1e-12)
+
+
+def test_a_run_with_sizes_that_is_opened_again_stays_as_it_is(tmp_path):
+    place, case = tmp_path / "r.h5", case_with(PRICED)
+    whole = run_session(case, path=place)
+    before = read_result(place)
+    again = run_session(case, path=place, resume=True)
+    after = read_result(place)
+    assert again.sizes == whole.sizes
+    assert (again.status, again.reason, again.objectives) == (whole.status, whole.reason, whole.objectives)
+    assert again.constraints.tolist() == whole.constraints.tolist()
+    for path in ("design/alpha", "catalogue/continuous", "catalogue/bound", "iterations/objectives"):
+        assert np.array_equal(before.array(path), after.array(path)), path
 
 
 def test_members_of_one_alpha_have_one_size():
@@ -124,6 +160,9 @@ def test_a_stopped_choice_is_kept_and_goes_on(tmp_path, monkeypatch):
     assert np.array_equal(view.alpha, part.alpha)
     assert set(part.alpha.tolist()) <= {0.0, 0.4, 1.0}
     assert len(view.array("catalogue/search/open_bound")) > 0
+    assert part.objectives["G"] == Evaluator(case).evaluate(part.alpha, gradient=False).objectives["G"]
+    assert part.objectives["G"] == pytest.approx(part.sizes.objective, rel=1e-12)
+    assert objective_rows(Source(tmp_path / "parts.h5")) == []
     resumed = run_session(case, path=tmp_path / "parts.h5", resume=True)
     assert np.array_equal(resumed.alpha, whole.alpha)
     assert resumed.objectives == whole.objectives
@@ -168,3 +207,13 @@ def test_lengths_that_vary_have_no_catalogue():
     case = case_with("[0, 1]", replace=[("bed: {body: truck,", moving), ("damping: 20}", "damping: 20}, cost: length")])
     with pytest.raises(CaseError, match="cost a length that varies"):
         run_session(case)
+
+
+def test_prices_are_not_lost_in_a_sum_of_lengths_that_vary():
+    wall = (
+        "  wall: {body: truck, grid: {list: [[-1, 0.1]]}, movable: {within: {line: {from: [-1, -1], to: [-1, 1]}}}}\n"
+    )
+    ropes = "  ropes: {from: edge, to: wall, law: {type: spring, stiffness: 4000}, cost: length}\n"
+    more = [("members:\n", f"{wall}members:\n"), ("loads:\n", f"{ropes}loads:\n")]
+    with pytest.raises(CaseError, match=r"design\.catalogue\.straps: .* there prices have to be the sizes"):
+        run_session(case_with("{sizes: [0, 1], prices: [0, 2]}", replace=more))
