@@ -30,6 +30,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "compiler/test_cache_safety.py": ("damaged_files_of_the_cache",),
     "compiler/test_machine_code.py": (
         "does_not_depend_on_what_was_compiled_before",
+        "same_files_in_every_process",
         "functions_inside_entries_are_kept",
     ),
     "compiler/test_processors.py": ("",),

@@ -29,7 +29,7 @@ from llvmlite import binding as llvm
 from llvmlite import ir as llvm_ir
 from llvmlite.ir.instructions import InsertValue
 from numba import types
-from numba.core import analysis, cgutils, ir
+from numba.core import analysis, cgutils, cpu_options, ir, itanium_mangler, targetconfig
 from numba.core.caching import FunctionCache, _Cache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
@@ -651,22 +651,15 @@ def outer(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
 
 def wrapped(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
     """Numba's object for a function that Python calls through Numba's own wrapper; it is not kept on the disk."""
-    options: dict[str, Any] = {"error_model": "numpy", "fastmath": _Sorted(fastmath) or False, "_target": _TARGET}
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": set(fastmath) or False, "_target": _TARGET}
     return numba.njit(**options)(function)
 
 
 def _made(function: Callable[..., Any], pipeline: type[Compiler], fastmath: frozenset[str], part: bool) -> Any:
     # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
     options: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True, "pipeline_class": pipeline}
-    options |= {"error_model": "numpy", "fastmath": _Sorted(fastmath) or False, "forceinline": part, "_target": _TARGET}
+    options |= {"error_model": "numpy", "fastmath": set(fastmath) or False, "forceinline": part, "_target": _TARGET}
     return numba.njit(**options)(function)
-
-
-class _Sorted(set[str]):
-    """A set that is written in one order, whatever the process hashes texts by: symbols have it in them."""
-
-    def __str__(self) -> str:
-        return str(sorted(self))
 
 
 class _Reader:
@@ -906,6 +899,10 @@ _TARGET = "mdstopo"
 class _Context(CPUContext):
     """What is compiled for our target; functions of Numba's own inside ours as `_jit_without_code` has them."""
 
+    def insert_const_bytes(self, mod: Any, bytes: bytes, name: str | None = None) -> Any:
+        """A constant; its name is the same in every process, which Numba's is not: texts are hashed anew in each."""
+        return super().insert_const_bytes(mod, bytes, name or hashlib.sha256(bytes).hexdigest()[:16])
+
     def _compile_subroutine_no_cache(
         self, builder: Any, impl: Any, sig: Any, locals: Any = None, flags: Any = None
     ) -> Any:
@@ -975,9 +972,58 @@ def _remember_signatures() -> None:
     function.get_call_type = get_call_type
 
 
+def _name_flags_in_order() -> None:
+    """Symbols tell the flags of floating point: in one order, whatever the process hashes texts by."""
+    cpu_options.FastMathOptions.encode = lambda self: str(sorted(self.flags))
+
+
+def _spare_flags() -> None:
+    """Flags of functions are compared at every call: those that were set first, and defaults where these differ."""
+    config: Any = targetconfig.TargetConfig
+
+    def values(self: Any) -> dict[str, Any]:
+        stated = self._values
+        return {key: stated.get(key, option.default) for key, option in self.options.items()}
+
+    def is_equal(self: Any, other: Any) -> Any:
+        if not isinstance(other, config):
+            return NotImplemented
+        return (type(self) is type(other) and self._values == other._values) or self.values() == other.values()
+
+    config.values, config.__eq__ = values, is_equal
+
+
+def _spare_variables() -> None:
+    """Which variables a statement mentions is asked again and again; most of what it holds is none, by its type."""
+    found_in, variable = ir.Inst._rec_list_vars, ir.Var
+    others = frozenset({ir.Loc, str, int, float, bool, type(None)})
+
+    def variables(self: Any, held: Any) -> list[Any]:
+        kind = type(held)
+        if kind is variable:
+            return [held]
+        if kind in others:
+            return []
+        if kind is not dict and kind is not tuple and kind is not list:
+            return list(found_in(self, held))
+        found = []
+        for each in held.values() if kind is dict else held:
+            if type(each) is variable:
+                found.append(each)
+            elif type(each) not in others:
+                found += variables(self, each)
+        return found
+
+    ir.Inst._rec_list_vars = variables
+
+
 _enter_target()
+_name_flags_in_order()
 if _LEAN:
     _remember_signatures()
+    _spare_flags()
+    _spare_variables()
+    itanium_mangler._escape_string = functools.lru_cache(1 << 16)(itanium_mangler._escape_string)
 
 
 # Run time

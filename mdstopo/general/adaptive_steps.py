@@ -278,7 +278,9 @@ def run_adaptive(
     decay = 0.0  # the rate at which dampers damp, as the last step tells
     limited = 0  # steps in a row that were as long as stability allows by it
     ended = 0.0  # length of the last step, if its last stage and the next step's first tell that rate
-    moving = model.mass * model.free
+    moving = np.empty_like(model.mass)
+    for d in range(moving.shape[0]):
+        moving[d] = model.mass[d] if model.free[d] != 0 else 0.0
     measures = explicit and method == 1 and not fixed_step > 0.0
     if switching:
         singular = start_modes(model, member_state, workspace, q0, v0, a0, lam, np.bool_(True))

@@ -412,15 +412,25 @@ def sides_inside(model, member_state, segment, history, o, stages, j, workspace)
         way = np.empty(model.mass.shape[0])
         q = np.empty(model.q0.shape[0])
         difference(model, history.stage_q[last], history.stage_q[first], way)
-        way *= 0.5
+        for d in range(way.shape[0]):
+            way[d] *= 0.5
         retract(model, history.stage_q[first], way, q)
-        v = 0.5 * (history.stage_v[first] + history.stage_v[last])
-        a = 0.5 * (history.stage_a[first] + history.stage_a[last])
+        v = _midway(history.stage_v, first, last)
+        a = _midway(history.stage_a, first, last)
         t = 0.5 * (history.when[first] + history.when[last])
-        lam = 0.5 * (history.lam[first] + history.lam[last])
+        lam = _midway(history.lam, first, last)
     if has_energy(model, j):
         general_forces(model, member_state, segment, t, q, v, np.bool_(False), workspace)
     return chosen_part(model, member_state, segment, j, np.int64(-1), t, q, v, a, lam, workspace)
+
+
+@kernel
+def _midway(rows, first, last):
+    """The mean of two rows."""
+    mean = np.empty(rows.shape[1])
+    for d in range(mean.shape[0]):
+        mean[d] = 0.5 * (rows[first, d] + rows[last, d])
+    return mean
 
 
 @kernel

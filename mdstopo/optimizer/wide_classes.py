@@ -259,7 +259,9 @@ def _finished(
     """
     N, R = len(x), len(rows)
     low, high, h, r, size = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
-    spread = np.abs(theta)
+    spread = np.empty(R)
+    for k in range(R):
+        spread[k] = abs(theta[k])
     piece = taken(counter)
     while piece < len(sums):
         place = piece * PIECE

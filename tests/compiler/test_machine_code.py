@@ -409,3 +409,31 @@ def test_machine_code_does_not_depend_on_what_was_compiled_before(tmp_path):
     assert codes(3, "spread first", before=tmp_path / "cache-1") == first
     assert codes(4, "command line") == first
     assert codes(5, "others use Numba", "spread first") == first
+
+
+WHOLE = """
+import mdstopo
+from mdstopo.engine import Evaluator
+
+case = mdstopo.load_case("restraint")
+Evaluator(case).evaluate(case.initial, gradient=False)
+"""
+
+
+@pytest.mark.skipif(
+    tried.versions() < ("0.68", "0.50"),
+    reason="Numba names constants after places in memory: files differ, code does not",
+)
+def test_the_kernels_of_a_scene_with_joints_are_the_same_files_in_every_process(tmp_path):
+    caches = [tmp_path / str(seed) for seed in (1, 2)]
+    started = []
+    for seed, cache in enumerate(caches, start=1):
+        env = os.environ | {"PYTHONPATH": str(ROOT), "MDSTOPO_CACHE_DIR": str(cache), "PYTHONHASHSEED": str(seed)}
+        started.append(subprocess.Popen([sys.executable, "-c", WHOLE], env=env))
+    assert [each.wait() for each in started] == [0, 0]
+    first, second = ({file.name: file.read_bytes() for file in cache.glob("kernels-*/*-*.code")} for cache in caches)
+    assert len(first) > 20
+    assert first.keys() == second.keys()
+    assert [name for name in first if first[name] != second[name]] == []
+    kept = [{file.name for file in cache.glob("kernels-*/unit-*.kept")} for cache in caches]
+    assert kept[0] == kept[1]
