@@ -974,7 +974,8 @@ def _remember_signatures() -> None:
 
 def _name_flags_in_order() -> None:
     """Symbols tell the flags of floating point: in one order, whatever the process hashes texts by."""
-    cpu_options.FastMathOptions.encode = lambda self: str(sorted(self.flags))
+    options: Any = cpu_options.FastMathOptions
+    options.encode = lambda self: str(sorted(self.flags))
 
 
 def _spare_flags() -> None:
@@ -995,7 +996,8 @@ def _spare_flags() -> None:
 
 def _spare_variables() -> None:
     """Which variables a statement mentions is asked again and again; most of what it holds is none, by its type."""
-    found_in, variable = ir.Inst._rec_list_vars, ir.Var
+    instruction: Any = ir.Inst
+    found_in, variable = instruction._rec_list_vars, ir.Var
     others = frozenset({ir.Loc, str, int, float, bool, type(None)})
 
     def variables(self: Any, held: Any) -> list[Any]:
@@ -1014,7 +1016,7 @@ def _spare_variables() -> None:
                 found += variables(self, each)
         return found
 
-    ir.Inst._rec_list_vars = variables
+    instruction._rec_list_vars = variables
 
 
 _enter_target()
@@ -1023,7 +1025,8 @@ if _LEAN:
     _remember_signatures()
     _spare_flags()
     _spare_variables()
-    itanium_mangler._escape_string = functools.lru_cache(1 << 16)(itanium_mangler._escape_string)
+    names: Any = itanium_mangler
+    names._escape_string = functools.lru_cache(1 << 16)(names._escape_string)
 
 
 # Run time
