@@ -151,7 +151,7 @@ $(VENV)/.ready-peers: $(VENV)/.ready
 	@touch $@
 
 peers: $(VENV)/.ready-peers
-	$(BIN)/python -m benchmarks $(or $(SECTIONS),peers ring forward million)
+	$(BIN)/python -m benchmarks $(or $(SECTIONS),peers ring forward seat million)
 
 # Machine code is compiled with an empty cache for each kind of processor, and put into the wheel.
 wheel: $(VENV)/.ready

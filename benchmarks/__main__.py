@@ -38,6 +38,7 @@ SECTIONS = {
     "peers_space": "two bodies in space with 1,020 springs beside other programs",
     "ring_space": "a closed loop of bodies in space beside other programs, forward runs too",
     "forward_space": "forward runs of two bodies in space beside other programs",
+    "seat": "the seated occupant of the restraint case, with contacts and slack, beside JAX",
     "million": "a million members beside JAX",
     "parts": "what parts of our own save: single precision, sines and powers, counting (compiles for minutes)",
     "golden": "what differs to the bit from values, gradients and iterates kept before (--check FILE, --write FILE)",
@@ -47,7 +48,7 @@ SECTIONS = {
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
-PEERS = ("peers", "ring", "forward", "million")
+PEERS = ("peers", "ring", "forward", "seat", "million")
 
 #: the same with scenes in space, which no page has yet
 PEERS_IN_SPACE = ("peers_space", "ring_space", "forward_space")

@@ -7,7 +7,8 @@ simulation.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
+from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, STIFF
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
+from mdstopo.compiler.threads import Outcome, allowed, side_by_side
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
 from mdstopo.integrators.scene_driver import DriverOptions, Method, ResponseResult, Scene, SceneDriver, SceneFamily
@@ -41,6 +43,9 @@ if TYPE_CHECKING:
 #: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
 #: else exceed ten tolerances on scenes whose members turn fast
 LOOSEST = 5e-5
+
+#: seconds that a load case takes from which on a thread of its own pays: one costs a tenth of that
+WORTH_A_THREAD = 1e-3
 
 #: steps that a time history has at least
 HISTORY = 50
@@ -79,6 +84,10 @@ class Evaluator:
         self.scenes: Mapping[str, Scene] = self._family.scenes(self._near)
         self._drivers: dict[str, SceneDriver] = {}
         self._coarse: dict[str, str] = {}
+        #: threads for load cases side by side; springs between free bodies share their passes instead
+        self.threads = allowed() if self.beyond else 1
+        #: how long each load case took when it was last evaluated, with gradients or without (s)
+        self._took: dict[tuple[str, bool], float] = {}
         self._n = case.n_design
         self._design = Design(case)
         self._rows = self._design.rows.view()
@@ -155,12 +164,13 @@ class Evaluator:
         status, message, grazing = Status.OK, "", ""
         looked: dict[str, tuple[Peak, ...]] = {}
         work: list[list[int]] = []
+        begun = self._side_by_side(design, exact, rows)
         for name, keys, driver in seen:
             too_coarse = self._coarse_step(name, design)
             if too_coarse:
                 status, message = Status.STEP_TOO_LARGE, too_coarse
                 break
-            result = driver.evaluate(design, exact, rows)
+            result = begun[name].taken() if begun else self._timed(name, driver, design, exact, rows)
             status, diagnosis = result.status, ""
             if not status.ok or result.meeting >= 0 or result.unresolved >= 0:
                 status, diagnosis = self._verdict(name, design, result)
@@ -185,6 +195,27 @@ class Evaluator:
             message = f"a slope of a formula of {where}{', '.join(self._unsure)} is infinite or has no value"
             status = Status.NO_GRADIENT
         return self._evaluation(looked, gradient, work_named(_total(work)), status, message)
+
+    def _side_by_side(self, design: FloatArray, exact: bool, rows: Rows) -> dict[str, Outcome]:
+        """What drivers have found of all load cases, each on a thread of its own; nothing where that does not pay.
+
+        The first evaluation of each kind takes one after the other: it may have to compile.
+        """
+        took = {name: self._took.get((name, exact), 0.0) for name, _, _ in self._seen}
+        pays = self.threads > 1 and len(took) > 1 and min(took.values()) > 0.0 and not self._may_be_coarse
+        if not pays or sorted(took.values())[-2] < WORTH_A_THREAD:
+            return {}
+        calls = {name: partial(self._timed, name, driver, design, exact, rows) for name, _, driver in self._seen}
+        longest_first = sorted(calls, key=took.__getitem__, reverse=True)
+        found = side_by_side([calls[name] for name in longest_first], self.threads)
+        return dict(zip(longest_first, found, strict=True))
+
+    def _timed(self, name: str, driver: SceneDriver, design: FloatArray, exact: bool, rows: Rows) -> ResponseResult:
+        """Evaluate one load case; how long it took is noted."""
+        began = perf_counter()
+        result = driver.evaluate(design, exact, rows)
+        self._took[name, exact] = perf_counter() - began
+        return result
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
         """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors, or why not."""

@@ -22,7 +22,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "bench/test_hunt.py": ("second_model[4", "second_model[10", "second_model[209"),
     "bench/test_hunt_space.py": ("second_model[1", "second_model[4"),
     "bench/test_optimum.py": ("rows[belts product", "rows[machine"),
-    "bench/test_peers.py": ("installed_peers",),
+    "bench/test_peers.py": ("installed_peers", "jax_moves_as_ours"),
     "cli/test_cli_commands.py": ("goes_on[2-", "goes_on[1-pareto"),
     "cli/test_finalize.py": ("a_fixed_step_is_verified",),
     "cli/test_plot_export_new.py": ("starter_case_is_right",),

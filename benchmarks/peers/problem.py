@@ -71,14 +71,18 @@ class Problem:
         np.savez(path, **{field.name: getattr(self, field.name) for field in fields(self)})
 
     @classmethod
-    def load(cls, path: Path) -> "Problem":
-        """Read what `save` wrote."""
+    def load(cls, path: Path) -> Any:
+        """Read what `save` wrote, of this class or of one of a kind."""
         with np.load(path) as stored:
             values: dict[str, Any] = {name: stored[name] for name in stored.files}
         if "turn" in values:
             from benchmarks.peers.space_problem import SpatialProblem
 
             cls = SpatialProblem
+        if "reach" in values:
+            from benchmarks.peers.seat_problem import SeatProblem
+
+            return SeatProblem.of(values)
         return cls(**values | {"end": float(values["end"]), "peak": bool(values["peak"])})
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.problem import Floats, Problem
+from benchmarks.peers.seat_problem import SeatProblem
 from benchmarks.peers.table import PEERS, Peer
 from mdstopo.bench.reference import Reference
 
@@ -26,7 +27,7 @@ ROUNDS, SECONDS = 7, 0.05
 class Field:
     """What all run on. designs (D, N); truths: G and gradient at each; one_core: whether all share one core in turn."""
 
-    problem: Problem
+    problem: Problem | SeatProblem
     designs: Sequence[Floats]
     truths: Sequence[Reference]
     one_core: bool = True
@@ -150,7 +151,7 @@ def _timed(made: Sequence[_Made], design: int, rounds: int, seconds: float) -> l
     ]  # fmt: skip
 
 
-def _unable(peer: Peer, problem: Problem) -> str:
+def _unable(peer: Peer, problem: Problem | SeatProblem) -> str:
     missing = peer.missing()
     if missing:
         return f"{' and '.join(missing)} not installed (pip install 'mdstopo[peers]')"

@@ -5,12 +5,15 @@ The two planar bodies are in `benchmarks.scenes`; here are the closed loops, and
 
 import json
 from math import cos, pi, sin
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 #: links of the ring; points on each; how far on in the ring the partner of a link is
 LINKS, POINTS, PARTNER = 10, 10, 3
+#: the case of the seated occupant, and what is left out of it: limits on responses, and with them the second load case
+SEAT, SEAT_CHANGES = Path(__file__).parents[2] / "cases" / "restraint.yaml", {"constraints": []}
 
 
 def ring() -> str:

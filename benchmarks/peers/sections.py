@@ -1,23 +1,24 @@
-"""The comparisons: two bodies, any case, a closed loop, a million members."""
+"""The comparisons: two bodies, any case, a closed loop, a seated occupant, a million members."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from benchmarks.peers import scenes, settings
+from benchmarks.peers import ours_seat, scenes, settings
 from benchmarks.peers.problem import Floats
 from benchmarks.peers.race import Entry, Field, Measured, race
-from benchmarks.peers.table import PEERS_IN_SPACE
+from benchmarks.peers.table import PEERS_IN_SPACE, PEERS_OF_SEAT
 from benchmarks.peers.tables import LEVELS, against_each, every_setting, standings
 from benchmarks.peers.translate import problem_of, spatial_problem_of
+from benchmarks.peers.translate_seat import seat_problem_of
 from benchmarks.scenes import DESIGNS, SCENES, design, scene
 from mdstopo.bench.reference import Reference, solution
 from mdstopo.bench.scenes import plate
 from mdstopo.bench.tables import Table
 from mdstopo.bench.work_precision import TIGHTEST, with_solver
 from mdstopo.case.model import Case
-from mdstopo.case.reader import read_case
+from mdstopo.case.reader import load_case, read_case
 from mdstopo.scene.bodies import is_spatial
 
 #: shares of the peers' times that are allowed
@@ -83,10 +84,24 @@ def forward() -> Iterator[Table]:
     yield from _at_equal_error("Two bodies, 1020 members, forward runs", found, BAR_FORWARD)
 
 
-def _at_equal_error(title: str, found: Sequence[Sequence[Measured]], bar: float) -> Iterator[Table]:
-    for name, own in zip(DESIGNS, found, strict=True):
+def _at_equal_error(
+    title: str, found: Sequence[Sequence[Measured]], bar: float, designs: Sequence[str] = DESIGNS
+) -> Iterator[Table]:
+    for name, own in zip(designs, found, strict=True):
         yield every_setting(f"{title}, {name} design", own)
         yield against_each(f"{title}, {name} design, at equal error", own, bar)
+
+
+def seat() -> Iterator[Table]:
+    """The seated occupant of cases/restraint.yaml, with contacts and slack, beside JAX."""
+    case = load_case(scenes.SEAT, overrides=scenes.SEAT_CHANGES)
+    problem = seat_problem_of(case)
+    designs = {"initial": np.array(case.initial), "random": np.random.default_rng(7).uniform(0.02, 0.5, case.n_design)}
+    tight = ours_seat.make(problem, tolerance=1e-11)
+    truths = [Reference(*tight(alpha, True)) for alpha in designs.values()]
+    course = Field(problem, list(designs.values()), truths)
+    found = race(course, list(settings.seat()), _tell, peers=PEERS_OF_SEAT)
+    yield from _at_equal_error("A seated occupant, objective and gradient", found, BAR, list(designs))
 
 
 def million() -> Iterator[Table]:

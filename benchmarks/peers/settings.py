@@ -94,6 +94,14 @@ def forward_in_space(joints: bool) -> Iterator[Entry]:
     yield Entry("mujoco", {"step": 2e-3, "integrator": "implicitfast"}, gradient=False)
 
 
+def seat() -> Iterator[Entry]:
+    """The seated occupant; JAX's dampers set in the more smoothly the longer its steps are."""
+    for tolerance in (3e-2, 1e-2, 1e-3, 1e-5, 1e-7):
+        yield Entry(OURS, {"tolerance": tolerance})
+    for steps, smooth in ((125, 0.0), (125, 3e-3), (250, 3e-3), (500, 1e-3), (1000, 1e-3), (2000, 5e-4)):
+        yield Entry("jax", {"steps": steps, "smooth": smooth})
+
+
 def million() -> Iterator[Entry]:
     """Members by the million, on all cores."""
     yield from ours(("gauss",), (1e-3, 1e-4, 1e-5, 1e-6, 1e-7))

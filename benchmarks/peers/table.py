@@ -39,6 +39,12 @@ PEERS = {
     "mujoco": Peer("benchmarks.peers.mujoco_forward", ("mujoco",), gradient=False),
 }
 
+#: the same for the seated occupant
+PEERS_OF_SEAT = {
+    OURS: Peer("benchmarks.peers.ours_seat", ("numba",)),
+    "jax": Peer("benchmarks.peers.jax_seat", ("jax", "scipy")),
+}
+
 #: the same for scenes in space
 PEERS_IN_SPACE = {
     OURS: Peer("benchmarks.peers.ours_space", ("numba",)),

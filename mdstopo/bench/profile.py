@@ -101,6 +101,7 @@ def profile(case: Case) -> Iterator[Table]:
     """
     with compiled_calls() as clock:
         evaluator = Evaluator(case)
+        evaluator.threads = 1  # load cases one after the other: a clock is for one thread
         found = evaluator.evaluate(case.start)
         if not found.status.ok:
             raise RuntimeError(f"{case.name}: {found.status.value} {found.message}".rstrip())

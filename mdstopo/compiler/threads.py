@@ -1,12 +1,15 @@
-"""One kernel on several threads at once: for passes over so many members that it pays (`mechanics.passes`).
+"""Threads, where they pay: one kernel on several of them (`mechanics.passes`), or a few calls side by side (`engine`).
 
 The threads are the system's own. They are made when a pass begins and have ended when it is over, which costs some 30
 microseconds; so none waits or spins in between, and an error or Ctrl-C finds none. Nothing here imports Numba.
 """
 
 import os
-from collections.abc import Callable
-from typing import Any
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextvars import copy_context
+from threading import Thread
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +40,51 @@ def allowed() -> int:
     if not (asked.isascii() and asked.isdigit() and 1 <= int(asked) <= MOST):
         raise ThreadsError(f"MDSTOPO_THREADS is {asked!r}, not a number of threads from 1 to {MOST}")
     return int(asked)
+
+
+class Outcome(NamedTuple):
+    """What a call has come to: what it returned, or the error that it raised."""
+
+    value: Any = None
+    error: Exception | None = None
+
+    def taken(self) -> Any:
+        """The value; raises the error."""
+        if self.error is not None:
+            raise self.error
+        return self.value
+
+
+def side_by_side(calls: Sequence[Callable[[], Any]], threads: int) -> list[Outcome]:
+    """Make calls on so many threads, of which this is one, in their order; back with what each has come to.
+
+    Compiled code lets other threads run meanwhile, Python does not. An interrupt of this thread goes on once the calls
+    that have begun are over.
+    """
+    waiting = deque(enumerate(calls))
+    found = [Outcome()] * len(calls)
+
+    def work() -> None:
+        while waiting:
+            try:
+                place, call = waiting.popleft()
+            except IndexError:  # another thread has taken the last one
+                return
+            try:
+                found[place] = Outcome(call())
+            except Exception as error:
+                found[place] = Outcome(error=error)
+
+    others = [Thread(target=copy_context().run, args=(work,)) for _ in range(min(threads, len(calls)) - 1)]
+    for other in others:
+        other.start()
+    try:
+        work()
+    finally:
+        waiting.clear()
+        for other in others:
+            other.join()
+    return found
 
 
 def shared(kernel: Callable[..., None], threads: int, job: tuple[Any, ...]) -> None:

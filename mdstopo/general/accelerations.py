@@ -38,7 +38,9 @@ from mdstopo.general.switches import (
     OF_JOINTS,
     SECOND,
     THOROUGH,
+    TURNING,
     carriers,
+    movers,
     switches_of,
 )
 from mdstopo.integrators.banded import factorise, solve
@@ -71,14 +73,15 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 #: what the solution at one state needs and leaves: attitudes, relative poses, sums, forces, K, C, slope
 #: of turning loads, inerters' mass; of the joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots,
 #: right side and the scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix
-#: the inverse masses, by coordinates and by slopes, Phi_q M^-1, the factors and the diagonal; one joint's own
-#: coordinates, their derivatives and multipliers; the known accelerations of what is driven; which pairs carry more
-#: than joints, and the switches (`switches`); what kinematics keep of the stages of a step (`stage_state`); how turns
-#: change with a shift of none, and with that of an implicit step (`shift_tangents`)
+#: the inverse masses, by coordinates and by slopes, Phi_q M^-1, the factors and the diagonal; of each joint its own
+#: coordinates, their derivatives and multipliers, and its stiffness (`place_joints`), behind all room for those of one;
+#: the known accelerations of what is driven; which bodies of each pair move, which pairs carry more than joints, and
+#: the switches (`switches`); what kinematics keep of the stages of a step (`stage_state`); how turns change with a
+#: shift of none, and with that of an implicit step (`shift_tangents`)
 FIELDS = (
     "turned", "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots",
-    "x", "scale", "inverse", "spread", "pull", "gram", "diagonal", "own", "known", "carries", "switches", "slopes",
-    "tangents",
+    "x", "scale", "inverse", "spread", "pull", "gram", "diagonal", "own", "stiffness", "known", "moves",
+    "carries", "switches", "slopes", "tangents",
 )  # fmt: skip
 
 
@@ -127,8 +130,10 @@ def make_workspace(model):
         np.zeros((n_joint, rows, both)),
         np.zeros(model.size[3]),
         np.ones((2, model.size[0])),
-        np.zeros((4, joint_places(model))),
+        np.zeros((n_joint + 1, 4, joint_places(model))),
+        np.zeros((n_joint, both, both)),
         np.zeros(n),
+        movers(model),
         carriers(model),
         switches_of(model),
         np.zeros((max(STAGES) if coordinates(model) != freedoms(model) else 0, n)),
@@ -158,8 +163,9 @@ def gather_multipliers(model, j, lam, out):
 @kernel
 def joint_state(model, q, v, workspace):
     """Phi, Phi_q and gamma of all joints of bodies that are turned in the workspace (`forces.turn_bodies`)."""
-    w = workspace.own[0]
-    wd = workspace.own[1]
+    own = workspace.own[model.joint.shape[0]]
+    w = own[0]
+    wd = own[1]
     for j in range(model.joint.shape[0]):
         place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
@@ -178,10 +184,11 @@ def joint_slopes(model, q, v, a, lam, workspace):
     In and out:
       workspace: the workspace, with the bodies turned (`forces.turn_bodies`); by_q, by_v are set, k is added to.
     """
-    w = workspace.own[0]
-    wd = workspace.own[1]
-    wdd = workspace.own[2]
-    mine = workspace.own[3]
+    own = workspace.own[model.joint.shape[0]]
+    w = own[0]
+    wd = own[1]
+    wdd = own[2]
+    mine = own[3]
     for j in range(model.joint.shape[0]):
         place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
@@ -480,10 +487,9 @@ def accelerations_vjp(model, workspace, k, c, turn, z, y, bar_q, bar_v):
     """
     joint = model.joint
     each = freedoms(model)
-    matrices_vjp(model, k, z, bar_q)
-    if workspace.switches[DAMPED] != 0:
-        matrices_vjp(model, c, z, bar_v)
-    turns_vjp(model, turn, z, bar_q, bar_v)
+    pairs_vjp(model, workspace, workspace.moves, k, c, z, bar_q, bar_v)
+    if workspace.switches[TURNING] != 0:
+        turns_vjp(model, turn, z, bar_q, bar_v)
     by_q = workspace.by_q
     by_v = workspace.by_v
     row = model.row
@@ -560,55 +566,81 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
     Out:
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
-    damped = workspace.switches[DAMPED] != 0
-    for p in range(model.pair.shape[0]):
-        carries = workspace.carries[p]
-        if carries == BOTH:
-            pair_matrix_vjp(model, p, k[p], z, bar_q)
-            if damped:
-                pair_matrix_vjp(model, p, c[p], z, bar_v)
-        elif carries != 0:
-            side = 1 if carries == SECOND else 0
-            body_matrix_vjp(model, p, side, k[p], z, bar_q)
-            if damped:
-                body_matrix_vjp(model, p, side, c[p], z, bar_v)
-    turns_vjp(model, turn, z, bar_q, bar_v)
+    pairs_vjp(model, workspace, workspace.carries, k, c, z, bar_q, bar_v)
+    if workspace.switches[TURNING] != 0:
+        turns_vjp(model, turn, z, bar_q, bar_v)
 
 
 @kernel
-def joints_vjp(model, workspace, q, v, a, lam, z, y, bar_q, bar_v):
-    """`accelerations_vjp` of the joints alone.
+def pairs_vjp(model, workspace, moves, k, c, z, bar_q, bar_v):
+    """bar_q (n,) -= K^T z and, where anything is damped, bar_v (n,) -= C^T z, of the bodies that move.
 
     Constant:
       model: the compiled scene.
-      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
-      lam (n_row,): multipliers (N, N m).
-      z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
-        the joints' rows.
-    In and out:
-      workspace: the workspace, with the bodies turned (`forces.turn_bodies`); k of the joints' pairs and by_q, by_v are
-        overwritten.
+      workspace: the workspace (`switches`).
+      moves (n_pair,): which bodies of each pair move (`switches.movers`); 0: the pair is left out.
+      k, c (n_pair, 2 D, 2 D): K and C by pairs.
+      z (n,): virtual displacements; driven parts are 0.
     Out:
-      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
+      bar_q, bar_v (n,): subtracted from.
     """
-    w = workspace.own[0]
-    wd = workspace.own[1]
-    wdd = workspace.own[2]
-    mine = workspace.own[3]
-    row = model.row
+    damped = workspace.switches[DAMPED] != 0
+    for p in range(model.pair.shape[0]):
+        if moves[p] == BOTH:
+            pair_matrix_vjp(model, p, k[p], z, bar_q)
+            if damped:
+                pair_matrix_vjp(model, p, c[p], z, bar_v)
+        elif moves[p] != 0:
+            side = 1 if moves[p] == SECOND else 0
+            body_matrix_vjp(model, p, side, k[p], z, bar_q)
+            if damped:
+                body_matrix_vjp(model, p, side, c[p], z, bar_v)
+
+
+@kernel
+def place_joints(model, workspace, q, v, a, lam):
+    """Prepare the joints for `joints_vjp`, at one state.
+
+    model: the compiled scene.
+    workspace: the workspace, with the bodies turned (`forces.turn_bodies`); own, stiffness, by_q and by_v are set.
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    lam (n_row,): multipliers (N, N m).
+    """
     for j in range(model.joint.shape[0]):
+        w = workspace.own[j, 0]
+        wd = workspace.own[j, 1]
+        wdd = workspace.own[j, 2]
+        mine = workspace.own[j, 3]
         place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
+        if not joint_is_point(model, j):
+            stiffness = workspace.stiffness[j]
+            stiffness[:] = 0.0
+            joint_acceleration_slopes(model, j, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
+            joint_stiffness(model, j, w, mine, stiffness)
+
+
+@kernel
+def joints_vjp(model, workspace, z, y, bar_q, bar_v):
+    """`accelerations_vjp` of the joints alone.
+
+    Constant:
+      model: the compiled scene.
+      workspace: the workspace, with the joints placed (`place_joints`).
+      z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
+        the joints' rows.
+    Out:
+      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
+    """
+    row = model.row
+    for j in range(model.joint.shape[0]):
         if joint_is_point(model, j):
-            point_joint_vjp(model, j, w, wd, wdd, mine, z, y, bar_q, bar_v)
+            own = workspace.own[j]
+            point_joint_vjp(model, j, own[0], own[1], own[2], own[3], z, y, bar_q, bar_v)
             continue
-        stiffness = workspace.k[model.joint[j, JOINT_PAIR]]
-        stiffness[:] = 0.0
-        joint_acceleration_slopes(model, j, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
-        joint_stiffness(model, j, w, mine, stiffness)
-        pair_matrix_vjp(model, model.joint[j, JOINT_PAIR], stiffness, z, bar_q)
+        pair_matrix_vjp(model, model.joint[j, JOINT_PAIR], workspace.stiffness[j], z, bar_q)
         for r in range(most_rows(model)):
             if row[j, r] >= 0:
                 value = y[row[j, r]]

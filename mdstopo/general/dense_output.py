@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.method_interface import beside, derivatives, is_continuous, point_of
+from mdstopo.general.method_interface import beside, derivatives, is_continuous, is_explicit, point_of
 from mdstopo.general.model import SUBJECT, unpack_general
 from mdstopo.general.responses import (
     APART,
@@ -18,11 +18,11 @@ from mdstopo.general.responses import (
     is_plain,
     rated,
 )
-from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
+from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.structures import bundle
 from mdstopo.integrators.steps import FORCES, OF_SAMPLES
-from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, quintic
+from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, quintic, relative_pose
 
 #: a finished motion, and a workspace for responses on it: the scene, the method's coefficients, state of the members,
 #: steps and how many there are; one state with its multipliers, slopes of the response there, states beside it
@@ -60,6 +60,52 @@ def finished(model, tables, member_state, history, count, work):
         np.zeros(n), np.zeros(n_row), np.empty((3, n)), np.empty(n_row), np.empty(n_q), np.empty((3, n)),
         np.empty(n_row), np.empty((2, n_q)), np.empty((2, 2, n)),
     )  # fmt: skip
+
+
+@kernel
+def known_at(tag, history, count, k, e):
+    """The stage that has the balance at the start (e = 0) or the end (e = 1) of step k, on its own side; or -1.
+
+    The first stage of an explicit step is its start; what is in front of a boundary is what is behind it where no law,
+    load or mode changes there.
+
+    tag: the method of integration (`method_interface`).
+    history, count: the history of steps, and how many steps it has.
+    """
+    if not is_explicit(tag) or k + e >= count:
+        return -1
+    same = (
+        history.index[k + e, SEGMENT] == history.index[k, SEGMENT]
+        and history.index[k + e, EVENTS] == history.index[k, EVENTS]
+    )
+    return history.index[k + e, FIRST] if same else -1
+
+
+@kernel
+def balance_at_end(tag, motion, k, e, q, v, a):
+    """Accelerations at the start (e = 0) or the end (e = 1) of step k, on its own side, with the modes of that step.
+
+    tag: the method of integration (`method_interface`).
+    motion: the finished motion, whose modes are those of the step; lam and the relative poses of its workspace are put
+      in place, the rest of this is overwritten.
+    k, e: the step, and its end.
+    q (n_q,), v (n,): the state there, whose driven part is put in place.
+    a (n,): the accelerations, out.
+    """
+    model, history = motion.model, motion.history
+    segment, t = history.index[k, SEGMENT], history.t[k + e]
+    known = known_at(tag, history, motion.count, k, e)
+    if known >= 0:
+        drive_state(model, segment, t, q, v)
+        copy_vector(history.stage_a[known], a)
+        copy_vector(history.lam[known], motion.lam)
+        relative_pose(model, q, v, motion.workspace.rel)
+        return
+    solve_accelerations(
+        model, motion.member_state, segment, t, q, v, np.bool_(False), motion.workspace, a, motion.lam
+    )  # fmt: skip
+    motion.work[FORCES] += 1
+    motion.work[OF_SAMPLES] += 1
 
 
 @kernel
@@ -212,9 +258,12 @@ def compare(
         last = go_to(tag, motion, k, c, exact, last)
         t = time_at(history, k, c)
         q, v, a = motion.q, motion.v, motion.a
-        solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
-        work[FORCES] += 1
-        work[OF_SAMPLES] += 1
+        if c <= 0.0 or c >= 1.0:
+            balance_at_end(tag, motion, k, 1 if c >= 1.0 else 0, q, v, a)
+        else:
+            solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
+            work[FORCES] += 1
+            work[OF_SAMPLES] += 1
         if plain and who.shape[0] > 0:
             group_rates(model, member_state, segment, t, group, q, v, a, workspace.rel, both)
             for m in range(top.shape[0]):
@@ -279,12 +328,7 @@ def go_to(tag, motion, k, c, exact, last):
             for e in range(2):
                 copy_vector(history.q[k + e], ends_q[e])
                 copy_vector(history.v[k + e], ends[e, 0])
-                solve_accelerations(
-                    model, member_state, segment, history.t[k + e], ends_q[e], ends[e, 0], no, workspace, ends[e, 1],
-                    motion.lam,
-                )  # fmt: skip
-            motion.work[FORCES] += 2
-            motion.work[OF_SAMPLES] += 2
+                balance_at_end(tag, motion, k, e, ends_q[e], ends[e, 0], ends[e, 1])
             last = k
         quintic(model, c, h, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], q, v)
     drive_state(model, segment, time_at(history, k, c), q, v)

@@ -12,7 +12,7 @@ from mdstopo.general.contact import add_contacts
 from mdstopo.general.members import SCALE, general_sums
 from mdstopo.general.model import CODE, COUNT, INERTER, PAIR, START
 from mdstopo.general.strides import FORCE, pair_freedoms, place_in_pair, sums_size, tangent_column
-from mdstopo.general.switches import APART, DAMPED
+from mdstopo.general.switches import APART, DAMPED, TURNING
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_bushings,
     add_inerter_tangents,
@@ -138,6 +138,7 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
             elif workspace.switches[APART] == 0:
                 none = k[p]
                 none[:] = 0.0
-        load_tangent(model, segment, t, q, v, workspace.turn)
+        if workspace.switches[TURNING] != 0:
+            load_tangent(model, segment, t, q, v, workspace.turn)
     if model.contact_pair.shape[0] > 0:
         add_contacts(model, member_state, rel, q, v, tangent, f, workspace.k, workspace.c)

@@ -129,6 +129,12 @@ def is_continuous(tag):
 
 
 @kernel
+def is_explicit(tag):
+    """Windows are implicit."""
+    return False
+
+
+@kernel
 def weights_of(tag, model, tables, history, w, out):
     """Gauss's weights, times the length of the window.
 
@@ -496,5 +502,6 @@ implement(
     beside=beside,
     derivatives=derivatives,
     is_continuous=is_continuous,
+    is_explicit=is_explicit,
     weights_of=weights_of,
 )

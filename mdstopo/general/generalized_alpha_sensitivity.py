@@ -74,6 +74,12 @@ def is_continuous(tag):
 
 
 @kernel
+def is_explicit(tag):
+    """Steps are implicit."""
+    return False
+
+
+@kernel
 def weights_of(tag, model, tables, history, w, out):
     """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion.
 
@@ -320,5 +326,6 @@ implement(
     beside=beside,
     derivatives=derivatives,
     is_continuous=is_continuous,
+    is_explicit=is_explicit,
     weights_of=weights_of,
 )

@@ -1,18 +1,19 @@
 """What a method of integration does for those who look at its steps, chosen by its tag when a kernel is compiled.
 
-The tag is a tuple of zeros whose length says which method is meant. A method has seven functions:
+The tag is a tuple of zeros whose length says which method is meant. A method has eight functions:
 
 1. `point_of`: the state inside a step;
 2. `step_back`: a step of the reverse sweep;
 3. `step_forward`: changes pushed through a step;
 4. `beside`: the motion a little later; `derivatives`: how many of its derivatives are those of the balance;
-   `is_continuous`: whether states inside a step are at hand;
+   `is_continuous`: whether states inside a step are at hand; `is_explicit`: whether stages follow from those before
+   them, and the first is the start of the step;
 5. `weights_of`: weights of a step's stages in an integral.
 
-A Runge-Kutta method that takes the steps of `adaptive_steps` has four more:
+A Runge-Kutta method that takes the steps of `adaptive_steps` has three more:
 
 6. `make_stages`: the balances of its stages; `step_error`: what they tell of the step's error;
-7. `scheme`: how many stages it has, and its order; `is_explicit`: whether stages follow from those before them.
+7. `scheme`: how many stages it has, and its order.
 """
 
 from collections.abc import Callable
@@ -197,7 +198,7 @@ def scheme(tag, method):
 
 
 def is_explicit(tag):
-    """Whether stages follow from those before them."""
+    """Whether stages follow from those before them, and the first is the start of the step."""
     raise NotImplementedError
 
 

@@ -11,9 +11,8 @@ import math
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel, part
-from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.general.adjoint import at_stage
-from mdstopo.general.dense_output import evaluate_here, finished, go_to, time_at
+from mdstopo.general.dense_output import balance_at_end, evaluate_here, finished, go_to, time_at
 from mdstopo.general.extremes import (
     COLUMNS,
     FRACTION,
@@ -33,7 +32,7 @@ from mdstopo.general.method_interface import is_continuous
 from mdstopo.general.model import ORDER, unpack_general
 from mdstopo.general.responses import follows_state, kinked, needs_balance
 from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
-from mdstopo.integrators.steps import FORCES, OF_POINTS, OF_SAMPLES
+from mdstopo.integrators.steps import OF_POINTS, OF_SAMPLES
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic
 
 #: columns of a sample: value, rate, member
@@ -140,12 +139,7 @@ def sample_inside(tag, motion, j, k, seen, accelerations):
         copy_vector(history.q[k + e], ends_q[e])
         copy_vector(history.v[k + e], ends[e, 0])
         if accelerations.shape[1] > 0 and np.isnan(accelerations[e, 0]):
-            solve_accelerations(
-                model, motion.member_state, history.index[k, SEGMENT], history.t[k + e], ends_q[e], ends[e, 0],
-                np.bool_(False), motion.workspace, accelerations[e], motion.lam,
-            )  # fmt: skip
-            motion.work[FORCES] += 1
-            motion.work[OF_SAMPLES] += 1
+            balance_at_end(tag, motion, k, e, ends_q[e], ends[e, 0], accelerations[e])
         copy_vector(accelerations[e], ends[e, 1])
         drive_state(model, history.index[k, SEGMENT], history.t[k + e], ends_q[e], ends[e, 0])
     for i in range(1, LAST):

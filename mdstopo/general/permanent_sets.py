@@ -168,7 +168,7 @@ def add_sets_of_rows(model, segment, member_state, history, at, z, j, out):
       out (R, slots): derivatives by the sets, added to.
     """
     rel = np.empty((model.pair.shape[0], pose_size(model)))
-    u = np.empty(freedoms(model))
+    u = np.empty((out.shape[0], freedoms(model)))
     relative_pose(model, history.stage_q[at], history.stage_v[at], rel)
     slot = 0
     for k in range(model.block.shape[0]):
@@ -177,14 +177,15 @@ def add_sets_of_rows(model, segment, member_state, history, at, z, j, out):
             continue
         lo = model.block[k, START]
         p = model.block[k, PAIR]
+        for m in range(out.shape[0]):
+            pair_displacement(model, rel, p, z[m, j], u[m])
         for i in range(lo, lo + model.block[k, COUNT]):
             if model.active[segment, k] != 0 and not law_is_idle(code, int(member_state[MODE, i])):
                 length, x, _ = member_motion(model, i, rel[p])
                 force, _ = set_slopes(model, k, i, member_state, x - member_state[SET, i], 0.0)
                 if length > 0.0 and force != 0.0:
                     for m in range(out.shape[0]):
-                        pair_displacement(model, rel, p, z[m, j], u)
-                        _, _, along = member_work(model, i, rel[p], u)
+                        _, _, along = member_work(model, i, rel[p], u[m])
                         out[m, slot] -= force * along
             slot += 1
 

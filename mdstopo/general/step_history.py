@@ -12,7 +12,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.members import MODE, SET
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.structures import bundle
-from mdstopo.general.switches import DAMPED
+from mdstopo.general.switches import BOTH, DAMPED, SECOND
 from mdstopo.scene.model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
@@ -71,8 +71,8 @@ class StepHistory:
         FloatArray,
         Field(
             "stages, n_pair, both, both",
-            "-dF/dq of each pair; where factors are kept that of pairs which carry more than joints, without "
-            "the joints' part",
+            "-dF/dq of each pair; where factors are kept that of pairs which carry more than joints, of the bodies "
+            "that move, without the joints' part",
         ),
     ]
     C: Annotated[FloatArray, Field("stages, n_pair, both, both", "-dF/dv, likewise")]
@@ -155,10 +155,10 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
     damped = workspace.switches[DAMPED] != 0  # else nobody reads C
     apart = has_factors(history)
     for p in range(workspace.k.shape[0]):
-        if workspace.carries[p] != 0 or not apart:
-            _copy(workspace.k[p], history.K[o, p])
-            if damped:
-                _copy(workspace.c[p], history.C[o, p])
+        kept = workspace.carries[p] if apart else BOTH
+        copy_carried(kept, workspace.k[p], history.K[o, p])
+        if damped:
+            copy_carried(kept, workspace.c[p], history.C[o, p])
     if history.mass.shape[0] > 1:
         _copy(workspace.mass, history.mass[o])
     if apart:
@@ -166,6 +166,22 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
         _copy(workspace.pull, history.pull[o])
         copy_vector(workspace.gram, history.gram[o])
         _copy(workspace.diagonal, history.diagonal[o])
+
+
+@kernel
+def copy_carried(carries, source, target):
+    """target = source, K or C (2 D, 2 D) of a pair: where one of its bodies alone moves, the part of that body.
+
+    carries: which bodies of the pair move (`switches.carriers`); 0: nothing is copied.
+    """
+    if carries == BOTH:
+        _copy(source, target)
+    elif carries != 0:
+        each = source.shape[0] // 2
+        first = each if carries == SECOND else 0
+        for i in range(each):
+            for j in range(each):
+                target[first + i, first + j] = source[first + i, first + j]
 
 
 @kernel

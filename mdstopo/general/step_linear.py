@@ -13,12 +13,13 @@ from mdstopo.general.accelerations import (
     joint_slopes,
     joint_state,
     joints_vjp,
+    place_joints,
     solve_unknowns,
 )
 from mdstopo.general.joint_matrix import solve_joints
 from mdstopo.general.method_interface import is_explicit
 from mdstopo.general.projection import project_back, project_forward
-from mdstopo.general.step_history import FIRST, has_factors, mass_of
+from mdstopo.general.step_history import FIRST, copy_carried, has_factors, mass_of
 from mdstopo.general.step_inside import table_of_step
 from mdstopo.general.switches import DAMPED
 from mdstopo.integrators.runge_kutta_tables import AA, A
@@ -47,11 +48,11 @@ def lay_out(model, history, o, workspace):
     if has_factors(history):
         copy_rows(history.turned[o], workspace.turned)
         workspace.k[:] = 0.0
+        workspace.c[:] = 0.0
         for p in range(k.shape[0]):
-            if workspace.carries[p] != 0:
-                copy_rows(k[p], workspace.k[p])
-                if workspace.switches[DAMPED] != 0:
-                    copy_rows(c[p], workspace.c[p])
+            copy_carried(workspace.carries[p], k[p], workspace.k[p])
+            if workspace.switches[DAMPED] != 0:
+                copy_carried(workspace.carries[p], c[p], workspace.c[p])
         k = workspace.k
         c = workspace.c
     else:
@@ -102,6 +103,7 @@ def prepare_stage_back(model, history, o, w_q, w_v, workspace):
     """
     if has_factors(history):
         copy_rows(history.turned[o], workspace.turned)
+        place_joints(model, workspace, history.stage_q[o], history.stage_v[o], history.stage_a[o], history.lam[o])
         return
     k, c = lay_out(model, history, o, workspace)
     factor_matrix(
@@ -127,11 +129,9 @@ def stage_back(model, history, o, workspace, z, y, bar_q, bar_v):
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
     if has_factors(history):
-        q = history.stage_q[o]
-        v = history.stage_v[o]
         solve_joints(model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, z, y)
         carried_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, bar_q, bar_v)
-        joints_vjp(model, workspace, q, v, history.stage_a[o], history.lam[o], z, y, bar_q, bar_v)
+        joints_vjp(model, workspace, z, y, bar_q, bar_v)
         return
     solve_unknowns(model, workspace, z, y)
     accelerations_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, y, bar_q, bar_v)

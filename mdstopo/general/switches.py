@@ -4,25 +4,34 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.model import CODE, INERTER, PAIR
-from mdstopo.mechanics.kinematics.kinematics_interface import freedoms
+from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, load_slopes, rotations
 from mdstopo.mechanics.laws.table import SPRING
 
 #: places of a workspace's `switches`: whether the mass is diagonal; whether the factors in the workspace are those of
 #: the joints' matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small
-#: eigenvalue; whether tangents leave out the joints' part
-DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART = range(5)
-#: which bodies of a pair move (`carriers`)
+#: eigenvalue; whether tangents leave out the joints' part; whether loads may depend on how bodies turn (else `turn`
+#: stays zero)
+DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING = range(6)
+#: which bodies of a pair move (`movers`)
 BOTH, SECOND, FIRST = 1, 2, 3
 
 
 @kernel
 def switches_of(model):
-    """The switches (5,) of a new workspace."""
-    switches = np.zeros(5, np.int64)
+    """The switches (6,) of a new workspace."""
+    switches = np.zeros(6, np.int64)
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
     switches[DAMPED] = 1 if is_damped(model) else 0
     switches[THOROUGH] = 1
+    switches[TURNING] = 1 if loads_turn(model) else 0
     return switches
+
+
+@kernel
+def loads_turn(model):
+    """Whether loads may depend on how bodies turn: those at points do, and gyroscopic moments."""
+    gyroscopic = load_slopes(model) > rotations(model)
+    return gyroscopic or model.load_body.shape[0] + model.timed_load.shape[0] > 0
 
 
 @kernel
@@ -49,10 +58,7 @@ def is_damped(model):
 
 @kernel
 def carriers(model):
-    """(n_pair,): not 0 where members, bushings or contacts act between two bodies, 0 where only joints do.
-
-    It is BOTH where both bodies move, or SECOND or FIRST where that body alone does.
-    """
+    """(n_pair,): as `movers` where members, bushings or contacts act between two bodies, 0 where only joints do."""
     found = np.zeros(model.pair.shape[0], np.int64)
     for k in range(model.block.shape[0]):
         found[model.block[k, PAIR]] = 1
@@ -60,12 +66,19 @@ def carriers(model):
         found[model.bushing_pair[j]] = 1
     for j in range(model.contact_pair.shape[0]):
         found[model.contact_pair[j]] = 1
+    return found * movers(model)
+
+
+@kernel
+def movers(model):
+    """(n_pair,): BOTH where both bodies of a pair move, SECOND or FIRST where that body alone does."""
+    found = np.empty(model.pair.shape[0], np.int64)
     each = freedoms(model)
+    moves = np.empty(2, np.int64)
     for p in range(found.shape[0]):
-        if found[p] != 0:
-            moves = np.zeros(2, np.int64)
-            for side in range(2):
-                for i in range(each):
-                    moves[side] += model.free[each * model.pair[p, side] + i] != 0
-            found[p] = FIRST if moves[1] == 0 else (SECOND if moves[0] == 0 else BOTH)
+        for side in range(2):
+            moves[side] = 0
+            for i in range(each):
+                moves[side] += model.free[each * model.pair[p, side] + i] != 0
+        found[p] = FIRST if moves[1] == 0 else (SECOND if moves[0] == 0 else BOTH)
     return found

@@ -116,10 +116,14 @@ class _Scaling:
     """Nesterov and Todd's scaling W of three-dimensional cones: W y = W^-1 s = lam; s, y (K, 3) inside the cone.
 
     W is symmetric. Its eigenvectors are the rows of `turn` (K, 3, 3), with the squares of its eigenvalues (K, 3): in
-    their basis the linear systems have a diagonal where W^2 has entries of which one would drown the others.
+    their basis the linear systems have a diagonal where W^2 has entries of which one would drown the others. Without
+    cones nothing is computed.
     """
 
     def __init__(self, s: Floats, y: Floats) -> None:
+        if not len(s):
+            self.lam, self.squares, self.turn = s, s, np.zeros((0, 3, 3))
+            return
         det_s, det_y = np.maximum(_determinant(s), TINY), np.maximum(_determinant(y), TINY)
         s_unit, y_unit = s / np.sqrt(det_s)[:, None], y / np.sqrt(det_y)[:, None]
         gamma = np.sqrt(0.5 * (1.0 + (s_unit * y_unit).sum(axis=1)))
@@ -152,10 +156,14 @@ class _Scaling:
 
     def longest(self, ds: Floats, dy: Floats) -> float:
         """The step to the boundary; found in the scaled space, where s and y are far from it."""
+        if not len(ds):
+            return float("inf")
         return min(_to_boundary(self.lam, self.inverse_times(ds)), _to_boundary(self.lam, self.times(dy)))
 
     def aim(self, target: float, cross: tuple[Floats, Floats] | None) -> Floats:
         """W (lam \\ (target e - lam o lam - (W^-1 ds) o (W dy))), (K, 3)."""
+        if not len(self.lam):
+            return self.lam
         right = -_product(self.lam, self.lam)
         right[:, 0] += target
         if cross is not None:
@@ -172,6 +180,8 @@ def _determinant(x: Floats) -> Floats:
 def _outside(x: Floats) -> float:
     """How far points (K, 3) lie outside the cone, at most: where one is on its boundary to rounding the scaling fails,
     and a step may leave the cone by far more."""
+    if not len(x):
+        return 0.0
     return float((np.sqrt(x[:, 1] ** 2 + x[:, 2] ** 2) - x[:, 0]).max(initial=0.0))
 
 
@@ -191,8 +201,6 @@ def _divided(a: Floats, by: Floats) -> Floats:
 
 def _to_boundary(x: Floats, d: Floats) -> float:
     """The largest step for which x + a d (K, 3) stays inside the cone."""
-    if not len(x):
-        return float("inf")
     a = _determinant(d)
     b = x[:, 0] * d[:, 0] - x[:, 1] * d[:, 1] - x[:, 2] * d[:, 2]
     c = np.maximum(_determinant(x), 0.0)
@@ -442,7 +450,8 @@ class _Interior:
                  (x.z_lower, d.z_lower), (x.z_upper, d.z_upper), (x.z_elastic, d.z_elastic)]  # fmt: skip
         free = ~self.equal
         pairs += [(x.s_limit[free], d.s_limit[free]), (x.y_limit[free], d.y_limit[free])]
-        most = max((float((-dx / at).max(initial=0.0)) for at, dx in pairs), default=0.0)
+        at, by = (np.concatenate(side) for side in zip(*pairs, strict=True))
+        most = float((-by / at).max(initial=0.0))
         longest = 1.0 / most if most > 0.0 else np.inf
         return share * min(longest, self.scaling.longest(d.s_norm, d.y_norm))
 

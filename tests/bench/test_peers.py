@@ -13,17 +13,18 @@ import mdstopo
 from mdstopo.bench.peers import NotACheckoutError, load
 from mdstopo.bench.reference import Reference
 from mdstopo.bench.scenes import plate
-from mdstopo.case.reader import read_case
+from mdstopo.case.reader import load_case, read_case
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT))
 
-from benchmarks.peers import ours, scenes, settings, tables  # noqa: E402
+from benchmarks.peers import ours, ours_seat, scenes, settings, tables  # noqa: E402
 from benchmarks.peers.peak import highest  # noqa: E402
 from benchmarks.peers.problem import GROUND, Problem, coefficients, moments, world  # noqa: E402
 from benchmarks.peers.race import Entry, Field, Measured, race  # noqa: E402
-from benchmarks.peers.table import OURS, PEERS, Peer  # noqa: E402
+from benchmarks.peers.table import OURS, PEERS, PEERS_OF_SEAT, Peer  # noqa: E402
 from benchmarks.peers.translate import NotForPeersError, problem_of  # noqa: E402
+from benchmarks.peers.translate_seat import seat_problem_of  # noqa: E402
 from benchmarks.scenes import scene  # noqa: E402
 
 FAKE = {"fake": Peer("tests.bench.fake_peer", ()), "gone": Peer("nowhere", ("a_package_that_nobody_has",))}
@@ -60,6 +61,37 @@ def test_the_ring_is_a_closed_loop_of_ten_bodies_with_a_thousand_members():
         np.testing.assert_allclose(one, two, atol=1e-14)
     loop = {frozenset(pair) for pair in problem.hinges.tolist() if GROUND not in pair}
     assert loop == {frozenset((k, (k + 1) % 10)) for k in range(10)}
+
+
+def test_the_seated_occupant_hangs_together_where_the_case_has_it(tmp_path):
+    case = load_case(scenes.SEAT, overrides=scenes.SEAT_CHANGES)
+    seat_problem_of(case).save(tmp_path / "problem.npz")
+    problem = Problem.load(tmp_path / "problem.npz")
+    bodies = case.bodies[1:]
+    np.testing.assert_allclose(
+        problem.place + problem.reach.sum(axis=1), [body.position for body in bodies], atol=1e-14
+    )
+    ends = np.array([bodies[k].position for k in problem.body]) + problem.at
+    lengths = [np.linalg.norm(ends - problem.anchor, axis=1)[problem.law == law] for law in (0, 1)]
+    gaps = [length for group in case.members if group.name != "retractors" for length in group.length]
+    np.testing.assert_allclose(lengths[0], gaps, rtol=1e-12)
+    np.testing.assert_allclose(lengths[1], case.members[7].length, rtol=1e-12)
+    assert (len(problem.body), problem.members) == (31, case.n_design)
+
+
+def test_the_seated_occupant_of_jax_moves_as_ours():
+    """Second order in the step, as the forces of stops and belts have kinks."""
+    if PEERS_OF_SEAT["jax"].missing():
+        pytest.skip("jax is not installed")
+    case = load_case(scenes.SEAT, overrides=scenes.SEAT_CHANGES)
+    problem, alpha = seat_problem_of(case), np.array(case.initial)
+    exact, _ = ours_seat.make(problem, tolerance=1e-8)(alpha, False)
+    course = Field(problem, [alpha], [Reference(exact, alpha)])
+    entries = [Entry("jax", {"steps": steps}, gradient=False) for steps in (250, 1000)]
+    (found,) = race(course, entries, rounds=1, seconds=0.0, peers=PEERS_OF_SEAT)
+    coarse, fine = (each.value_error for each in found)
+    assert coarse < 2e-5
+    assert fine < 2e-6
 
 
 def test_moments_times_coefficients_are_squared_lengths():
@@ -132,7 +164,8 @@ def test_settings_are_of_programs_that_there_are():
     assert {entry.peer for entry in every} == set(PEERS)
     for entry in every:
         assert entry.gradient <= PEERS[entry.peer].gradient
-    assert all(find_spec(peer.module) for peer in PEERS.values())
+    assert {entry.peer for entry in settings.seat()} == set(PEERS_OF_SEAT)
+    assert all(find_spec(peer.module) for peer in (*PEERS.values(), *PEERS_OF_SEAT.values()))
 
 
 def test_the_standings_name_the_fastest_and_whether_the_bar_is_met():

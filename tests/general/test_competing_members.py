@@ -6,6 +6,8 @@ import pytest
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
+from mdstopo.general.competing_members import compare
+from mdstopo.integrators.steps import OF_SAMPLES, OK
 
 GRID = """
 format: 1
@@ -100,3 +102,28 @@ def test_an_optimisation_brings_the_largest_forces_of_several_members_down_toget
     start = mdstopo.evaluate(result.case, np.full(6, 0.5), gradient=False).objectives["F"]
     assert result.objectives["F"] < 0.9 * start
     assert sum(peak.value >= 0.999 * peaks[0].value for peak in peaks) >= 2
+
+
+@pytest.mark.parametrize(("integrator", "few"), [("runge_kutta", True), ("generalized_alpha", False)])
+def test_forces_at_ends_of_steps_are_those_of_a_balance_there(integrator, few):
+    """Explicit steps have these balances already: theirs are looked up but where a law, load or mode changes."""
+    text = text_of(integrator=integrator).replace(
+        "spring, stiffness: 10}", "gap, stiffness: 30, damping: 2, gap: 0.01}"
+    )
+    text = text.replace("end: 2}", "end: 2}\nloads: [{body: plate, force: [{table: [[0, 0], [0.5, 2], [1, 0]]}, 0]}]")
+    case = read_case(text)
+    driver = Evaluator(case).driver(case.load_cases[0].name)
+    code, count, _ = driver.run(np.array(case.initial), False)
+    assert code == OK
+    assert driver.events > 0
+    places = np.column_stack([np.repeat(np.arange(float(count)), 2), np.tile([0.0, 1.0], count)])
+    before = int(driver.work[OF_SAMPLES])
+    top, seen = compare(driver, 0, places, np.arange(5), count)
+    made = int(driver.work[OF_SAMPLES]) - before
+    assert made <= 2 * (driver.events + len(driver.scene.model.times)) if few else made >= len(places)
+    for i in range(5):
+        value, rate = driver.sample_response(0, places, True, count, who=i)[2][:, :2].T
+        sign = np.where(seen[i, :, 0] >= 0.0, 1.0, -1.0)
+        np.testing.assert_allclose(sign * seen[i, :, 0], value, rtol=1e-12, atol=1e-12 * value.max())
+        np.testing.assert_allclose(sign * seen[i, :, 1], rate, rtol=1e-6, atol=1e-6 * np.abs(rate).max())
+        assert top[i] == pytest.approx(value.max(), rel=1e-12)

@@ -45,6 +45,7 @@ NO_STRIDES = {
     ("settle.py", "range(3)"): "how often it lands",
     ("step_history.py", "range(3)"): "names of columns",
     ("step_history.py", "range(6)"): "names of columns",
+    ("switches.py", "range(6)"): "names of columns",
 }
 #: modules that say what is planar, or spatial, when a case is compiled
 OF_ONE_DIMENSION = {"planar_scene.py", "spatial_scene.py", "turning_drives.py"}
