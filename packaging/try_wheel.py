@@ -14,6 +14,7 @@ import time
 import venv
 from pathlib import Path
 
+from mdstopo import load_case
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.shipped import names
 from mdstopo.cli.new import templates
@@ -29,6 +30,8 @@ EXACT = ("--method", "adjoint", "--method", "direct", "--history")
 HELD = ("--method", "adjoint", "--method", "constant_load")
 #: options that keep every run short
 SHORT = ("--set", "optimizer.max_iterations=1", "--overwrite")
+#: the same of one with candidates that are priced, which it is after some iterations
+FEW_ROUNDS = ("--set", "optimizer.max_iterations=20", "--overwrite")
 #: members of a scene whose kernels are those of many variables
 MANY = ("--set", "points.torso_edge.grid.rectangle.count=200")
 
@@ -37,7 +40,8 @@ def commands() -> list[list[str]]:
     """What is run, the first one first: of each command a list of words."""
     found = [["run", "fig6", "--overwrite"]]
     for case in (*names(), *map(str, sorted(GALLERY.glob("*.yaml")))):
-        found += [["run", case, *SHORT], ["check", case]]
+        designs = bool(load_case(case).objectives)
+        found += [["run", case, *SHORT] if designs else ["simulate", case, "--overwrite"], ["check", case]]
     for name in templates():
         found += [["new", name, "--template", name], ["run", f"{name}.yaml", *SHORT], ["gradient", f"{name}.yaml"]]
     return found + of_fig6() + of_kinds() + of_verbs()
@@ -54,6 +58,8 @@ def of_fig6() -> list[list[str]]:
             ["gradient", "fig6", *chosen, "--set", "solver.step=0.002", *EXACT, "--error-estimate", "--overwrite"],
             ["gradient", "fig6", *chosen, "--set", "solver.step=0.002", *others],
         ]
+        if kind.springs:
+            found.append(["run", str(KINDS / "priced.yaml"), *chosen, *FEW_ROUNDS])
     return [*found, ["run", "fig6", *MANY, *SHORT]]
 
 
@@ -84,15 +90,15 @@ def of_verbs() -> list[list[str]]:
     """Commands beside `run`, `check` and `gradient`."""
     return [
         ["pareto", "fig7", "--points", "2", "--workers", "1", *SHORT],
-        ["sweep", "set", "fig6", "members.belts.law.stiffness=200,250", "--workers", "1", *SHORT],
+        ["sweep", "set", "fig6", "members.belts.law.stiffness=200,250", "optimizer.max_iterations=1", "--overwrite"],
         ["simulate", "fig6", "--overwrite"],
-        ["finalize", "results/fig6.h5", "--keep", "10", "--overwrite"],
+        ["run", "fig6", *SHORT],
+        ["finalize", "results/fig6.h5", "--keep", "200", "--overwrite"],
         ["report", "results/fig6.h5"],
         ["run", "mechanism.yaml", "--set", "solver.settle=true", *SHORT],
-        ["check", "mooring", "--set", "solver.settle=true"],
+        ["check", "mechanism.yaml", "--set", "solver.settle=true"],
         ["bound", "isolator"],
         ["fit", str(KINDS / "fit.yaml"), "--overwrite"],
-        ["run", str(KINDS / "priced.yaml"), "--set", "optimizer.max_iterations=20", "--overwrite"],
     ]
 
 
