@@ -14,6 +14,7 @@
 #   make peers                    compare with other programs, which it installs (SECTIONS=ring for some of it)
 #   make readme                   measure everything, put the tables into docs/, five rows into the README
 #   make wheel                    a wheel with compiled kernels, into dist/ (some minutes)
+#   make try-wheel                install that wheel afresh, and see that no command compiles anything
 #   make clean                    remove the environment and whatever was made; results stay
 
 PYTHON ?= $(or $(shell command -v python3.11),python3)
@@ -41,10 +42,10 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test test-all test-lowest test-numba lint types docs reproduce gallery bench peers readme wheel clean
+.PHONY: help run test test-all test-lowest test-numba lint types docs reproduce gallery bench peers readme wheel try-wheel clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,17p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,18p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -153,11 +154,16 @@ $(VENV)/.ready-peers: $(VENV)/.ready
 peers: $(VENV)/.ready-peers
 	$(BIN)/python -m benchmarks $(or $(SECTIONS),peers ring forward seat million)
 
-# Machine code is compiled with an empty cache for each kind of processor, and put into the wheel.
+# Machine code is compiled for each kind of processor, or found in the cache, and put into the wheel.
 wheel: $(VENV)/.ready
 	$(BIN)/python packaging/ship_kernels.py build/kernels
+	@rm -f dist/mdstopo-*.whl
 	MDSTOPO_KERNELS=$(CURDIR)/build/kernels $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 	@ls -l dist/*.whl
+
+# In an environment of its own: no command may compile anything.
+try-wheel:
+	$(BIN)/python packaging/try_wheel.py dist/mdstopo-*.whl
 
 readme: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks --readme

@@ -1,146 +1,247 @@
-"""Machine code for the wheel: `python packaging/ship_kernels.py FOLDER` compiles what cases of every kind call.
+"""Machine code for the wheel: `python packaging/ship_kernels.py FOLDER` compiles all entries of the package.
 
-For each kind of processor in `compiler.store.PROCESSORS` that this one can stand for, the commands below are run with
-an empty cache, and what they have compiled is put into FOLDER, with a manifest that says of which sources it is. An
-entry that none of them calls is a mistake. A wheel built with MDSTOPO_KERNELS=FOLDER carries it (setup.py); `make
-wheel` does both, and `python packaging/try_wheel.py` tells whether what it brings is enough.
+`entries.txt` beside this file states the types of arguments that each entry is called with; the tests hold every call
+that they make to it. No case is computed: an entry is compiled for stated types. That is done for each
+kind of processor in `compiler.store.PROCESSORS` that this one can stand for, and the machine code is put into FOLDER,
+with a manifest that says of which sources it is. What was compiled before, as when it was interrupted, is found in the
+cache and not compiled again.
+
+A wheel built with MDSTOPO_KERNELS=FOLDER carries it (setup.py); `make wheel` does both, and `python
+packaging/try_wheel.py` tells whether it is enough.
 """
 
-import ast
+import gc
+import importlib
 import json
 import os
+import pkgutil
 import shutil
 import subprocess
 import sys
-import tempfile
+import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from inspect import signature
+from itertools import product
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
 from llvmlite.binding import get_host_cpu_features
 
+import mdstopo
 from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.case.shipped import names
-from mdstopo.cli.new import templates
-from mdstopo.compiler.store import MANIFEST, PROCESSORS, SETTINGS, digest_of_sources, layout
+from mdstopo.case.model import SolverSettings
+from mdstopo.compiler import store
+from mdstopo.compiler.entry import DTYPES, Entry, types_of
+from mdstopo.compiler.threads import cores
+from mdstopo.general.general_driver import load_method
+from mdstopo.integrators.choice import method_of
 
 HERE = Path(__file__).resolve().parent
-PACKAGE = HERE.parent / "mdstopo"
-#: small problems, one of each kind (`make gallery`), and those that have what these have not
-GALLERY, KINDS = HERE.parent / "gallery", HERE / "kinds"
-#: methods of differentiation that go with variables, and one that does not
-EXACT = ("--method", "adjoint", "--method", "direct", "--history")
-HELD = ("--method", "adjoint", "--method", "constant_load")
-#: options that keep every run short
-SHORT = ("--set", "optimizer.max_iterations=1", "--overwrite", "--quiet")
-#: members of a scene whose kernels are those of many variables
-MANY = ("--set", "points.torso_edge.grid.rectangle.count=200")
+TABLE = HERE / "entries.txt"
+#: shares of the work on one kind of processor. Entries for scenes in space have functions of their own inside, so two
+#: processes do little twice
+SPACE, REST = "space", "rest"
+#: the integers of a packed scene: in a plane, and in space, which is known by their dimensions (`general.model`)
+PLANAR_SCENE, SPATIAL_SCENE = "q1", "q2"
 
 
-def commands(folder: Path) -> list[list[str]]:
-    """Commands that between them call every kernel that cases need: of each a list of words."""
-    found = [["run", name, *SHORT] for name in (*names(), *map(str, sorted(GALLERY.glob("*.yaml"))))]
-    for name in templates():
-        found += [["new", name, "--template", name, "--quiet"], ["run", f"{name}.yaml", *SHORT]]
-        found += [[verb, f"{name}.yaml", "--quiet"] for verb in ("check", "gradient")]
-    for integrator in INTEGRATORS:
-        chosen = ("--set", f"solver.integrator={integrator}")
-        found.append(["run", "fig6", *chosen, *SHORT])
-        found += [[verb, "fig6", *chosen, "--quiet"] for verb in ("check", "gradient")]
-        if integrator != "gauss":
-            found += [["run", "mechanism.yaml", *chosen, *SHORT], ["run", "space.yaml", *chosen, *SHORT]]
-    found += [
-        ["run", "fig6", *MANY, *SHORT],
-        ["pareto", "fig7", "--points", "2", "--workers", "1", *SHORT],
-        ["gradient", "fig6", "--history", "--error-estimate", "--quiet"],
-        ["simulate", "fig6", "--overwrite", "--quiet"],
-        ["finalize", "results/fig6.h5", "--keep", "10", "--quiet", "--overwrite"],
-        ["report", "results/fig6.h5", "--quiet"],
-        ["run", "mechanism.yaml", "--set", "solver.settle=true", *SHORT],
-        ["check", "mooring", "--set", "solver.settle=true", "--quiet"],
-        ["bound", "isolator", "--quiet"],
-        ["fit", str(KINDS / "fit.yaml"), "--overwrite", "--quiet"],
-        ["run", str(KINDS / "priced.yaml"), "--set", "optimizer.max_iterations=20", "--overwrite", "--quiet"],
-    ]
-    return found + of_kinds()
+class Stated(NamedTuple):
+    """An entry and types of its arguments, as of `compiler.entry.types_of`: module, name, types."""
+
+    module: str
+    name: str
+    types: str
+
+    @property
+    def share(self) -> str:
+        """Which process compiles it."""
+        kinds = self.types.split()
+        return SPACE if self.module.startswith("mdstopo.general.") and SPATIAL_SCENE in kinds[:2] else REST
 
 
-def of_kinds() -> list[list[str]]:
-    """Every method of differentiation with every integrator that goes with it, in a plane and in space."""
+class Variant(NamedTuple):
+    """What differs where an entry takes the steps of an integrator: the module of `simulate`, then types."""
+
+    module: str
+    method: str
+    tables: str
+    scene: str
+
+
+def variants(general: bool) -> list[Variant]:
+    """What there is of each integrator that computes springs between free bodies, or all other scenes."""
     found = []
-    for integrator in INTEGRATORS:
-        chosen = ("--set", f"solver.integrator={integrator}", "--set", "solver.step=0.002")
-        others = (*HELD, "--method", "iterative") if integrator == "generalized_alpha" else HELD
-        found += [
-            ["gradient", "fig6", *chosen, *EXACT, "--error-estimate", "--quiet"],
-            ["gradient", "fig6", *chosen, *others, "--quiet"],
-        ]
-        for name in ("planar", "space") if integrator != "gauss" else ():
-            file = str(KINDS / f"{name}.yaml")
-            found += [
-                ["run", file, *chosen, *SHORT],
-                ["check", file, *chosen, "--quiet"],
-                ["gradient", file, *chosen, *EXACT, "--error-estimate", "--quiet"],
-                ["gradient", file, *chosen, *others, "--set", "design.variables={}", "--quiet"],
-                ["simulate", file, *chosen, "--overwrite", "--quiet"],
-            ]
-    free = str(KINDS / "free.yaml")
-    for integrator in ("gauss", "runge_kutta"):
-        chosen = ("--set", f"solver.integrator={integrator}")
-        found += [["run", free, *chosen, *SHORT], ["gradient", free, *chosen, *EXACT, "--quiet"]]
-    return [*found, ["gradient", free, *HELD, "--quiet"]]
-
-
-def without_code(folder: Path) -> list[str]:
-    """Entries of the package, module and name, of which a folder has no machine code."""
-    found = []
-    for source in sorted(PACKAGE.rglob("*.py")):
-        module = ".".join(("mdstopo", *source.relative_to(PACKAGE).with_suffix("").parts))
-        for each in ast.parse(source.read_text(encoding="utf-8")).body:
-            if not isinstance(each, ast.FunctionDef):
-                continue
-            marks = {mark.id for mark in each.decorator_list if isinstance(mark, ast.Name)}
-            if marks & {"entry", "vector_entry"} and not any(folder.glob(f"{module}.{each.name}-*.code")):
-                found.append(f"{module}.{each.name}")
+    for name, kind in INTEGRATORS.items():
+        made = method_of(name, SolverSettings())
+        if general:
+            loaded = load_method(kind)
+            scenes = [PLANAR_SCENE] * (not kind.free_only) + [SPATIAL_SCENE] * (not kind.planar)
+        elif kind.springs:
+            loaded, scenes = made.load(), [PLANAR_SCENE]
+        else:
+            continue
+        types = types_of((loaded.TAG, made.tables))
+        assert types is not None
+        found += [Variant(loaded.simulate.__module__, *types.split(), scene) for scene in scenes]
     return found
 
 
-def compiled(processor: str, destination: Path) -> list[str]:
-    """Compile for one kind of processor into a folder of its name; the commands that failed."""
-    name, features = PROCESSORS[processor]
-    environment = {key: value for key, value in os.environ.items() if key not in SETTINGS}
+def expanded(stated: Stated) -> list[Stated]:
+    """A line with what its words stand for: a line for every integrator, in a plane and in space.
+
+    `simulate` of an integrator has neither others' coefficients nor scenes that it does not compute.
+    """
+    general = stated.module.startswith("mdstopo.general.")
+    asked = stated.types.split()
+    found = variants(general)
+    if "method" not in asked and "tables" in asked:
+        found = [each for each in found if each.module == stated.module]
+    types = [" ".join(getattr(each, word, word) for word in asked) for each in found]
+    return [stated._replace(types=each) for each in dict.fromkeys(types)]
+
+
+def table() -> list[Stated]:
+    """All entries with all types of arguments."""
+    found = []
+    for line in TABLE.read_text(encoding="utf-8").splitlines():
+        if line and not line.startswith("#"):
+            place, types = line.split(maxsplit=1)
+            found += expanded(Stated(*place.rsplit(".", 1), types))
+    return found
+
+
+def entries() -> dict[tuple[str, str], Entry]:
+    """All entries of the package by module and name: whatever may hold kernels is imported for it."""
+    found = {}
+    for module in _modules():
+        for name, each in vars(importlib.import_module(module)).items():
+            if isinstance(each, Entry) and each.__module__ == module:
+                found[module, name] = each
+    return found
+
+
+def _modules() -> Iterator[str]:
+    """Names of the package's modules that may hold kernels."""
+    for found in pkgutil.iter_modules(mdstopo.__path__, "mdstopo."):
+        top = found.name.partition(".")[2]
+        if found.ispkg and top not in store.WITHOUT_KERNELS:
+            inside = pkgutil.walk_packages([str(Path(mdstopo.__path__[0]) / top)], f"{found.name}.")
+            yield from (each.name for each in inside)
+
+
+def mistakes(stated: list[Stated]) -> list[str]:
+    """What is wrong with the table: entries that it has not or that there are not, types that cannot be."""
+    known = entries()
+    has = {(each.module, each.name) for each in stated}
+    found = [f"{module}.{name} has no line in {TABLE.name}" for module, name in sorted(known.keys() - has)]
+    found += [f"{TABLE.name}: there is no entry {module}.{name}" for module, name in sorted(has - known.keys())]
+    for each in stated:
+        if (each.module, each.name) in known:
+            asked = len(signature(known[each.module, each.name].py_func).parameters)
+            if asked != len(each.types.split()):
+                found.append(f"{TABLE.name}: {each.module}.{each.name} takes {asked} arguments, not {each.types}")
+    return found
+
+
+def arguments_of(types: str) -> tuple[Any, ...]:
+    """Arguments of these types, to compile an entry for, not to call it with."""
+    numbers = {"b": True, "i": 0, "f": 0.0}
+    found: list[Any] = []
+    for each in types.split():
+        letter, count = each[0], int(each[1:] or 0)
+        if letter in DTYPES:
+            found.append(np.zeros((1,) * count, DTYPES[letter]))
+        else:
+            found.append((0,) * count if letter == "t" else numbers[letter])
+    return tuple(found)
+
+
+def compile_share(share: str) -> None:
+    """Compile a share of the table for the processor that the environment states.
+
+    Prints as JSON, one line each, the names of the files that an entry needs, and last the folder in which they are.
+    """
+    gc.disable()  # as in `session.compiling_apart`
+    known = entries()
+    for each in table():
+        if each.share == share:
+            known[each.module, each.name].compile(*arguments_of(each.types))
+            print(json.dumps(_files(store.path_of(*each).name)), flush=True)
+    print(json.dumps(str(store.cache_folder())), flush=True)
+
+
+def _files(name: str) -> list[str]:
+    """A file and all that hold what its code calls."""
+    found: dict[str, None] = {}
+    waiting = [name]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            path = store.cache_folder() / name
+            code = store.read(path)
+            if code is None:
+                raise SystemExit(f"{path} was not written: is the disk full, or Numba of a version that was not tried?")
+            found[name] = None
+            waiting += code.needs
+    return list(found)
+
+
+def compiled(processor: str, share: str, destination: Path) -> str:
+    """Have a process compile a share for one kind of processor, and copy what it is; in words what went wrong."""
+    name, features = store.PROCESSORS[processor]
+    environment = {key: value for key, value in os.environ.items() if key not in store.SETTINGS}
     environment |= {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ",".join(f"+{each}" for each in features)}
-    failed = []
-    with tempfile.TemporaryDirectory(prefix="mdstopo-ship-") as place:
-        folder = Path(place)
-        environment["MDSTOPO_CACHE_DIR"] = str(folder / "cache")
-        for words in commands(folder):
-            program = [sys.executable, "-m", "mdstopo", *words]
-            done = subprocess.run(program, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-            print(f"{processor}: mdstopo {' '.join(words)}: {done.returncode}", flush=True)
-            if done.returncode not in (0, 1) or "Traceback" in done.stderr:
-                failed.append(f"mdstopo {' '.join(words)}\n{done.stderr}")
-        (kept,) = (folder / "cache").glob("kernels-*")
-        target = destination / processor
-        shutil.rmtree(target, ignore_errors=True)
-        target.mkdir(parents=True)
-        for path in sorted(kept.iterdir()):
-            if path.suffix in (".code", ".compiled") or path.name.startswith("ready-"):
-                shutil.copyfile(path, target / path.name)
-    return failed + [f"{processor}: no command has called {each}" for each in without_code(target)]
+    program = [sys.executable, __file__, "--share", share]
+    files: set[str] = set()
+    last = ""
+    lines = iter([each for each in table() if each.share == share])
+    began = time.monotonic()
+    with subprocess.Popen(program, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            found = json.loads(line)
+            if isinstance(found, str):
+                last = found
+                continue
+            files.update(found)
+            each = next(lines)
+            print(f"{time.monotonic() - began:5.0f} s  {processor}  {each.module}.{each.name} {each.types}", flush=True)
+    if process.returncode or not last:
+        return f"{processor}, {share}: ended with {process.returncode}, after {len(files)} files"
+    for file in files:
+        shutil.copyfile(Path(last) / file, destination / processor / file)
+    return ""
 
 
 def main(destination: Path) -> int:
-    """Compile for all kinds of processors that this one can run, one beside the other."""
+    """Compile for all kinds of processors that this one can run, as many side by side as there are cores."""
+    wrong = mistakes(table())
     has = get_host_cpu_features()
-    chosen = [name for name, (_, needed) in PROCESSORS.items() if all(has.get(each) for each in needed)]
-    with ThreadPoolExecutor() as pool:
-        failed = [each for found in pool.map(lambda name: compiled(name, destination), chosen) for each in found]
-    for each in failed:
+    chosen = [name for name, (_, needed) in store.PROCESSORS.items() if all(has.get(each) for each in needed)]
+    for name in store.PROCESSORS.keys() - set(chosen):
+        print(f"left out: {name}, which this processor cannot run", flush=True)
+    if not chosen:
+        wrong.append("this processor can run none of the kinds that code is shipped for")
+    if not wrong:
+        shutil.rmtree(destination, ignore_errors=True)
+        for name in chosen:
+            (destination / name).mkdir(parents=True)
+        with ThreadPoolExecutor(max(1, cores())) as pool:
+            tasks = product((SPACE, REST), chosen)
+            wrong = [each for each in pool.map(lambda task: compiled(task[1], task[0], destination), tasks) if each]
+    for each in wrong:
         print(each, file=sys.stderr)
-    manifest = {"sources": digest_of_sources(), "layout": layout(), "processors": chosen}
-    (destination / MANIFEST).write_text(json.dumps(manifest) + "\n", encoding="utf-8")
-    return 1 if failed or not chosen else 0
+    if wrong:
+        return 1
+    manifest = {"sources": store.digest_of_sources(), "layout": store.layout(), "processors": chosen}
+    (destination / store.MANIFEST).write_text(json.dumps(manifest) + "\n", encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]).resolve()))
+    if sys.argv[1] == "--share":
+        compile_share(sys.argv[2])
+    else:
+        sys.exit(main(Path(sys.argv[1]).resolve()))

@@ -8,13 +8,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.entries import hold_calls
 from tests.tiers import mark, without_test
 
 _WHERE = "import importlib.util as u; found = u.find_spec('mdstopo'); print(found and found.origin or '')"
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Refuse to begin where programs that tests start would be those of another checkout."""
+    """Hold calls of entries to the wheel's table; refuse to begin where programs that tests start would be those of
+    another checkout."""
+    hold_calls()
     if hasattr(config, "workerinput"):
         return  # the process that gives the tests out has asked
     asked = [sys.executable, "-P", "-c", _WHERE]

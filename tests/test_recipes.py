@@ -1,19 +1,25 @@
-"""What is packaged agrees with the project: the conda recipe, the Dockerfile, and the scenes of the wheel's kernels."""
+"""What is packaged agrees with the project: the conda recipe, the Dockerfile, and the wheel's kernels."""
 
 import json
 import re
 import runpy
 import tomllib
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
 from mdstopo import __version__, load_case
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.shipped import names
 from mdstopo.cli.new import templates
+from mdstopo.compiler import store
+from mdstopo.compiler.entry import Entry, types_of
+from mdstopo.scene import design
 from mdstopo.scene.refusals import refusals
+from tests.entries import held
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -55,14 +61,26 @@ def test_the_dockerfile_installs_the_wheel_and_runs_the_command_as_no_root() -> 
     assert by_name["COPY"].startswith("dist/mdstopo-*.whl ")
 
 
-def test_kernels_are_shipped_for_every_case_template_gallery_problem_and_integrator(tmp_path: Path) -> None:
-    commands = runpy.run_path(str(ROOT / "packaging/ship_kernels.py"))["commands"](tmp_path)
-    run = {words[1] for words in commands if words[0] == "run"}
+def script(name: str) -> dict[str, Any]:
+    """What a program of packaging/ defines."""
+    return runpy.run_path(str(ROOT / "packaging" / f"{name}.py"))
+
+
+@pytest.fixture(scope="module")
+def ship() -> dict[str, Any]:
+    """What compiles the wheel's kernels."""
+    return script("ship_kernels")
+
+
+def test_a_wheel_is_tried_with_every_case_template_gallery_problem_and_integrator() -> None:
+    commands = script("try_wheel")["commands"]()
+    run = {words[1] for words in commands if words[0] in ("run", "simulate")}
     assert set(names()) <= run
     assert {f"{name}.yaml" for name in templates()} <= run
     assert {str(path) for path in (ROOT / "gallery").glob("*.yaml")} <= run
     said = {word for words in commands for word in words}
     assert {f"solver.integrator={name}" for name in INTEGRATORS} <= said
+    assert {"adjoint", "direct", "iterative", "constant_load"} <= said
 
 
 def test_the_kinds_of_cases_that_kernels_are_shipped_for_can_be_computed() -> None:
@@ -72,10 +90,51 @@ def test_the_kinds_of_cases_that_kernels_are_shipped_for_can_be_computed() -> No
         assert refusals(load_case(path)) == [], path
 
 
-def test_an_entry_that_no_command_has_called_is_named(tmp_path: Path) -> None:
-    without_code = runpy.run_path(str(ROOT / "packaging/ship_kernels.py"))["without_code"]
-    entries = without_code(tmp_path)
-    assert len(entries) > 40
-    assert {"mdstopo.general.direct.push", "mdstopo.sensitivity.candidate_prices.price_candidates"} <= set(entries)
-    (tmp_path / "mdstopo.general.direct.push-0123.code").touch()
-    assert set(entries) - set(without_code(tmp_path)) == {"mdstopo.general.direct.push"}
+def test_the_table_of_entries_has_all_of_them_with_as_many_types_as_they_have_arguments(ship: dict[str, Any]) -> None:
+    stated = ship["table"]()
+    assert ship["mistakes"](stated) == []
+    assert len(set(stated)) == len(stated) > len(ship["entries"]()) > 40
+    for each in stated:
+        assert types_of(ship["arguments_of"](each.types)) == each.types, each
+
+
+def test_what_is_wrong_with_the_table_of_entries_is_named(ship: dict[str, Any]) -> None:
+    first, second, *others = ship["table"]()
+    gone = first._replace(module="mdstopo.gone")
+    assert ship["mistakes"]([*others, first, second, gone]) == [
+        f"entries.txt: there is no entry mdstopo.gone.{first.name}"
+    ]
+    without = [each for each in others if each[:2] != first[:2] and each.name != "weigh"]
+    (missing,) = {line for line in ship["mistakes"]([first, second, *without]) if "weigh" in line}
+    assert missing == "mdstopo.scene.design.weigh has no line in entries.txt"
+    (wrong,) = ship["mistakes"]([first, second._replace(types="d1 q1"), *others])
+    assert wrong.startswith(f"entries.txt: {second.module}.{second.name} takes ")
+    assert wrong.endswith("arguments, not d1 q1")
+
+
+def test_the_table_has_steps_of_every_integrator_for_the_scenes_that_it_computes(ship: dict[str, Any]) -> None:
+    kinds = list(INTEGRATORS.values())
+    scenes = sum(not kind.free_only for kind in kinds) + sum(not kind.planar for kind in kinds)
+    count = Counter(each.module for each in ship["table"]() if each.name == "simulate")
+    assert sum(number for module, number in count.items() if ".general." in module) == scenes
+    assert sum(number for module, number in count.items() if ".integrators." in module) == sum(k.springs for k in kinds)
+    assert sum(each.name == "rows_vjp" for each in ship["table"]()) == scenes
+
+
+def test_an_entry_compiled_for_stated_types_is_found_with_all_that_it_calls(ship: dict[str, Any]) -> None:
+    (stated,) = (each for each in ship["table"]() if each.name == "weigh")
+    weigh = ship["entries"]()[stated.module, stated.name]
+    weigh.compile(*ship["arguments_of"](stated.types))
+    name = store.path_of(*stated).name
+    code = store.read(store.path_of(*stated))
+    assert code is not None
+    assert set(ship["_files"](name)) >= {name, *code.needs}
+    with pytest.raises(SystemExit, match=r"mdstopo.nothing-.*\.code was not written"):
+        ship["_files"](store.path_of("mdstopo", "nothing", "d1").name)
+
+
+def test_a_call_that_the_table_of_entries_does_not_have_is_told() -> None:
+    known = Entry(design.weigh.py_func, frozenset())
+    held(known, "d1 d1")  # no entry of the package: a test's own
+    with pytest.raises(AssertionError, match=r"a wheel would not have .*: mdstopo\.scene\.design\.weigh d1 d1"):
+        held(design.weigh, "d1 d1")

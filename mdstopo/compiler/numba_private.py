@@ -469,8 +469,9 @@ class Optimised(JITCodeLibrary):
 
     def _needs(self) -> list[units.Unit]:
         """What it calls."""
-        for library in self._linking_libraries:
-            self._reload_init.update(library._reload_init)
+        if hasattr(self, "_reload_init"):  # Numba 0.60 and 0.62 have none
+            for library in self._linking_libraries:
+                self._reload_init.update(library._reload_init)
         return [_unit_of(library) for library in self._linking_libraries]
 
     @property

@@ -198,13 +198,15 @@ def shipped_folder() -> Path | None:
 
 
 def is_kept(name: str) -> bool:
-    """Whether a file of that name came with the package, or lies in the folder of this source."""
-    shipped = None if _foreign else shipped_folder()
-    return (shipped is not None and (shipped / name).exists()) or (cache_folder() / name).exists()
+    """Whether kernels are kept of which a file of that name, in the folder of this source, is the note.
+
+    With the package come all kernels that there are (`packaging/ship_kernels.py`), without notes.
+    """
+    return (not _foreign and shipped_folder() is not None) or (cache_folder() / name).exists()
 
 
 def are_kept(prefix: str) -> bool:
-    """The same of any file whose name begins so."""
+    """Whether any file whose name begins so came with the package, or lies in the folder of this source."""
     places = [cache_folder()] if _foreign else [shipped_folder(), cache_folder()]
     return any(next(place.glob(f"{prefix}*"), None) is not None for place in places if place is not None)
 

@@ -119,6 +119,8 @@ def _stepped(
 ) -> tuple[FloatArray, FloatArray, float, float]:
     """Go along a step (n,) from q (n_q,), as far as the force along it does not point back: ahead at its start.
 
+    Where it points back at the start, the step is one of rounding, and is taken as it is.
+
     Returns where it ends, what is left of the force there, the share of the step taken, and by how much the force along
     it at the end of all of it differs from what was foreseen.
     """
@@ -131,7 +133,7 @@ def _stepped(
         along = float(own @ left)
         if look == 0:
             off = abs(along - foreseen)
-        if along >= -BACK * ahead and (look == 0 or along <= BACK * ahead):
+        if ahead <= 0.0 or (along >= -BACK * ahead and (look == 0 or along <= BACK * ahead)):
             break
         # Illinois' rule: an end that stays counts half
         if along > 0.0:

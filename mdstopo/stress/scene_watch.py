@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import TracebackType
 
-from mdstopo.compiler.store import cache_folder
+from mdstopo.compiler.store import cache_folder, is_kept
 from mdstopo.stress.judge import judge
 from mdstopo.stress.registry import scenes
 from mdstopo.stress.scene import Outcome, Scene
@@ -26,7 +26,7 @@ def _marker() -> Path:
 
 def compiled() -> bool:
     """Whether all scenes have been computed here with this version."""
-    return _marker().exists()
+    return is_kept(_marker().name)
 
 
 def open_scenes(_: object) -> Perform:

@@ -57,7 +57,7 @@ def test_code_of_other_sources_or_for_other_layouts_is_not_taken(
     assert shipped() is None
 
 
-def test_what_came_along_is_read_and_known_and_damage_is_noticed(
+def test_what_came_along_is_read_and_damage_is_noticed(
     shipped: Shipped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place = shipped()
@@ -65,13 +65,10 @@ def test_what_came_along_is_read_and_known_and_damage_is_noticed(
     monkeypatch.setattr(store, "cache_folder", lambda: tmp_path / "cache")
     path = tmp_path / "cache" / "mdstopo.general.step.x-123.code"
     assert store.read(path) is None
-    assert not store.is_kept("ready-springs")
     store.write(path, CODE)
     (place / path.name).write_bytes(path.read_bytes())
     path.unlink()
-    (place / "ready-springs").touch()
     assert store.read(path) == CODE
-    assert store.is_kept("ready-springs")
     assert store.are_kept("mdstopo.general.")
     assert not store.are_kept("mdstopo.integrators.")
     damaged = bytearray((place / path.name).read_bytes())
@@ -80,14 +77,27 @@ def test_what_came_along_is_read_and_known_and_damage_is_noticed(
     assert store.read(path) is None
 
 
+def test_where_kernels_came_along_none_waits_to_be_compiled(
+    shipped: Shipped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "cache_folder", lambda: tmp_path)
+    assert shipped() is not None
+    assert store.is_kept("ready-springs")
+    assert shipped(sources="others") is None
+    assert not store.is_kept("ready-springs")
+    (tmp_path / "ready-springs").touch()
+    assert store.is_kept("ready-springs")
+
+
 def test_a_law_of_another_distribution_has_its_kernels_compiled(
     shipped: Shipped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place = shipped()
     assert place is not None
+    (place / "mdstopo.general.step.x-123.code").touch()
     monkeypatch.setattr(store, "cache_folder", lambda: tmp_path / "cache")
-    (place / "ready-springs").touch()
     assert store.is_kept("ready-springs")
+    assert store.are_kept("mdstopo.general.")
     monkeypatch.setattr(store, "_foreign", "theirs")
     assert not store.is_kept("ready-springs")
-    assert not store.are_kept("ready-")
+    assert not store.are_kept("mdstopo.general.")

@@ -1,0 +1,35 @@
+"""Every call of an entry is held to the table of those that a wheel has machine code for (packaging/entries.txt)."""
+
+import runpy
+import sys
+from functools import cache
+from pathlib import Path
+
+from mdstopo.compiler.entry import Entry
+
+SHIP = Path(__file__).resolve().parents[1] / "packaging" / "ship_kernels.py"
+
+
+@cache
+def table() -> frozenset[tuple[str, str, str]]:
+    """Module and name of an entry, and types of its arguments."""
+    return frozenset(runpy.run_path(str(SHIP))["table"]())
+
+
+def held(entry: Entry, types: str) -> None:
+    """Raise AssertionError where an entry of the package is called with types that are not in the table."""
+    module, name = entry.__module__, entry.__name__
+    of_package = module.startswith("mdstopo.") and getattr(sys.modules.get(module), name, None) is entry
+    if of_package and (module, name, types) not in table():
+        raise AssertionError(f"a wheel would not have the code for this call: {module}.{name} {types} ({SHIP.parent})")
+
+
+def hold_calls() -> None:
+    """Have all calls of this process held to the table."""
+    ready = Entry._ready
+
+    def checked(entry: Entry, types: str) -> object:
+        held(entry, types)
+        return ready(entry, types)
+
+    Entry._ready = checked  # type: ignore[method-assign,assignment]
