@@ -63,12 +63,6 @@ def make_expression(word: str, keys: Fields, frames: Frames, reading: Reading) -
     for name in twice:
         reading.mistake(inside(inside(keys.path, "parameters"), name), f"the name {name!r} is a response already")
     good = not twice and None not in made.values()
-    for name, response in made.items():
-        if response is not None and frames.geometry.responses[response.kind].of_members:
-            here = inside(inside(keys.path, "of"), name)
-            message = f"found {response.kind}, the largest of a group's members; allowed are responses of one thing"
-            reading.mistake(here, message)
-            good = False
     try:
         parse(keys["formula"], (*made, *parameters, TIME))
     except FormulaError as error:
@@ -94,4 +88,6 @@ def program_of(response: Response) -> ResponseProgram:
     from mdstopo.formula.response_formulas import response_program  # most cases have no formulas
 
     names = (*(name for name, _ in response.of), *(name for name, _ in response.parameters))
-    return response_program(response.formula, names, len(response.of))
+    # forces of members have a sign in kernels, so that a force that changes its sign is a kink that is located
+    signed = tuple(place for place, (_, part) in enumerate(response.of) if part.group is not None)
+    return response_program(response.formula, names, len(response.of), signed)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.model import GROUND, Motion
-from mdstopo.case.prescribed import AGREE, agree, position_at_start, prescribed, size_of, value_at
+from mdstopo.case.prescribed import AGREE, agree, position_at_start, prescribed, rate_at_start, size_of
 from mdstopo.case.prescribed_rotation import prescribed_rotation, turning_rate_at_start
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.value import Value, frozen
@@ -108,12 +108,17 @@ def _start(motion: Fields, body: Fields, window: Window, geometry: Geometry, rea
         if given is None or given.kind == "acceleration":
             continue
         path = inside(part.path, given.kind)
-        rate, scale = value_at(given.signal, window.start), size_of(given.signal)
-        if given.kind == "position":
+        if given.kind == "velocity":
+            moves = rate_at_start(given.signal, window, path, reading)
+            if moves is None:
+                continue
+            rate, scale = moves
+        else:
             start = position_at_start(given.signal, window, path, reading)
             if start is None:
                 continue
             value, rate, per_second = start
+            scale = size_of(given.signal)
             stated = body["angle"] if index is None else body["position"][index]
             if index is not None or "angle" in body.stated:
                 what = "angle" if index is None else f"position's {axis}"

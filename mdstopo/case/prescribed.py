@@ -51,6 +51,15 @@ def prescribed(fields: Fields | None) -> Prescribed | None:
     return Prescribed(kind, fields[kind][0])
 
 
+def rate_at_start(signal: Signal, window: Window, path: str, reading: Reading) -> tuple[float, float] | None:
+    """A velocity at the start, and its size; None where a formula has no value, which is noted at `path`."""
+    rate = value_at(signal, window.start)
+    if not math.isfinite(rate):
+        reading.mistake(path, f"the expression has no value at the start, {number_text(window.start)} s")
+        return None
+    return rate, size_of(signal)
+
+
 def position_at_start(signal: Signal, window: Window, path: str, reading: Reading) -> tuple[float, float, float] | None:
     """Value and rate at the start of positions, and by how much they change per second.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Prescribed, PrescribedRotation
-from mdstopo.case.prescribed import AGREE, KINDS, agree, position_at_start, prescribed, size_of, value_at
+from mdstopo.case.prescribed import AGREE, KINDS, agree, position_at_start, prescribed, rate_at_start, size_of, value_at
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.rotations import unit
 from mdstopo.case.words import inside, listed, number_text
@@ -89,7 +89,7 @@ def _angle(angle: Prescribed, own: float, path: str, window: Window, reading: Re
     if angle.kind == "acceleration":
         return own, abs(own)
     if angle.kind == "velocity":
-        return value_at(angle.signal, window.start), size_of(angle.signal)
+        return rate_at_start(angle.signal, window, path, reading)
     start = position_at_start(angle.signal, window, path, reading)
     if start is None:
         return None

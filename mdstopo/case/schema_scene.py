@@ -93,13 +93,13 @@ COORDINATE = Record(
     (
         Key(
             "acceleration",
-            Signals(("a",)),
+            Signals(("a",), formula=True),
             "acceleration, integrated from the body's own position and velocity",
             unit="m/s^2 or rad/s^2",
         ),
         Key(
             "velocity",
-            Signals(("v",)),
+            Signals(("v",), formula=True),
             "velocity; the body's own, where stated, must agree at the start",
             unit="m/s or rad/s",
         ),

@@ -121,8 +121,18 @@ BUSHING_KEYS = with_keys(
 # Prescribed motion.
 _MOVED = "of the centre of mass"
 _ANGLE_KEYS = (
-    Key("acceleration", Signals(("a",)), "integrated from the body's own angular velocity", unit="rad/s^2"),
-    Key("velocity", Signals(("v",)), "rate; the body's own, where stated, must agree at the start", unit="rad/s"),
+    Key(
+        "acceleration",
+        Signals(("a",), formula=True),
+        "integrated from the body's own angular velocity",
+        unit="rad/s^2",
+    ),
+    Key(
+        "velocity",
+        Signals(("v",), formula=True),
+        "rate; the body's own, where stated, must agree at the start",
+        unit="rad/s",
+    ),
     Key(
         "position",
         Signals(("x",), constant=False, order="rising", at_least=4, formula=True),

@@ -1,4 +1,4 @@
-"""What `compiler.formulas.call_formula` becomes in machine code: a call through an address. Imports Numba."""
+"""What `compiler.formulas.call_formula` becomes in machine code: a call through a table of addresses. Imports Numba."""
 
 from typing import Any
 
@@ -28,10 +28,11 @@ def _typed(_context: Any) -> Any:
 def _lowered(context: Any, build: Any, kinds: Any, arguments: Any) -> Any:
     double, whole = ir.DoubleType(), ir.IntType(64)
     numbers = double.as_pointer()
-    address, p, *rest = arguments
+    address, p, *rest, group = arguments
     data = cgutils.create_struct_proxy(kinds.args[1])(context, build, value=p).data
-    form = ir.FunctionType(ir.VoidType(), [numbers, *[double] * len(NAMES), whole, whole, numbers])
-    function = build.inttoptr(build.fptosi(address, whole), form.as_pointer())
+    form = ir.FunctionType(ir.VoidType(), [numbers, *[double] * len(NAMES), whole, numbers]).as_pointer()
+    table = build.inttoptr(build.fptosi(address, whole), form.as_pointer())
+    function = build.load(build.gep(table, [group]))
     out = cgutils.alloca_once(build, double, size=WIDTH)
     build.call(function, [data, *rest, out])
     values = [build.load(build.gep(out, [ir.Constant(whole, i)])) for i in range(WIDTH)]

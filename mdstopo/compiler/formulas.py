@@ -1,9 +1,9 @@
 """Formulas as machine code: made by LLVM in some milliseconds, and called by kernels through an address.
 
-A kernel that calls one is compiled once for all formulas. The function of a set of formulas gives the numbers of one of
-its groups:
+A kernel that calls one is compiled once for all formulas. Each group of a set of formulas is a function that gives the
+numbers of the group; the address of a set is that of a table of the addresses of these functions:
 
-    void f(const double *p, double x, double xd, double t, double l0, int64 mode, int64 group, double *out)
+    void group(const double *p, double x, double xd, double t, double l0, int64 mode, double *out)
 
 Names in formulas are those of `NAMES`, "p 0" and so on for the numbers of p, and "bit 0" and so on for those of mode.
 
@@ -16,7 +16,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,9 +37,7 @@ CLEAR = 1e-9
 #: functions of LLVM's; all others are those of the C library
 _LLVM = {"sqrt": "llvm.sqrt.f64", "abs": "llvm.fabs.f64"}
 
-_FORM = ctypes.CFUNCTYPE(
-    None, ctypes.c_void_p, *[ctypes.c_double] * len(NAMES), ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p
-)
+_FORM = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *[ctypes.c_double] * len(NAMES), ctypes.c_int64, ctypes.c_void_p)
 Floats = NDArray[np.float64]
 
 #: what keeps machine code in memory
@@ -49,7 +47,7 @@ _ENGINES: list[Any] = []
 def call_formula(address: float, p: Floats, x: float, xd: float, t: float, l0: float, mode: int, group: int) -> Any:
     """Numbers of a group of formulas, WIDTH of them; those that a group has not are 0.
 
-    address: where the function is.
+    address: where the table of functions is.
     p: parameters.
     x, xd: elongation (m) and its rate (m/s).
     t: time (s).
@@ -61,10 +59,11 @@ def call_formula(address: float, p: Floats, x: float, xd: float, t: float, l0: f
 
 
 class FormulaCalls:
-    """Many calls from Python of the function at an address, with one set of parameters p."""
+    """Many calls from Python of the functions in the table at an address, with one set of parameters p."""
 
     def __init__(self, address: float, p: Floats) -> None:
-        self._function = _FORM(int(address))
+        self._table = ctypes.cast(int(address), ctypes.POINTER(ctypes.c_void_p))
+        self._functions: dict[int, Callable[..., None]] = {}
         self._p, self._out = np.ascontiguousarray(p), np.zeros(WIDTH)
         self._p_place, self._out_place = self._p.ctypes.data, self._out.ctypes.data
 
@@ -77,8 +76,10 @@ class FormulaCalls:
         mode: the bits of the switches.
         group: which group of formulas.
         """
-        self._out[:] = 0.0
-        self._function(self._p_place, x, xd, t, l0, mode, group, self._out_place)
+        function = self._functions.get(group)
+        if function is None:
+            function = self._functions[group] = _FORM(self._table[group] or 0)
+        function(self._p_place, x, xd, t, l0, mode, self._out_place)
         found: list[float] = self._out.tolist()
         return found
 
@@ -91,21 +92,24 @@ def _register() -> None:
 
 @functools.cache
 def address_of(groups: tuple[Group, ...]) -> int:
-    """Where the machine code of groups of formulas is; made at the first call."""
+    """Where the table of the machine code of groups of formulas is; made at the first call."""
     import llvmlite.binding as llvm
 
     from mdstopo.compiler.call import target
 
     code = llvm.parse_assembly(str(_Module(groups).module))
     code.verify()
-    engine = llvm.create_mcjit_compiler(code, target().create_target_machine(jit=True, opt=2))
+    machine = target().create_target_machine(jit=True, opt=2)
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))
+    builder.getModulePassManager().run(code, builder)
+    engine = llvm.create_mcjit_compiler(code, machine)
     engine.finalize_object()
     _ENGINES.append(engine)
-    return int(engine.get_function_address("formulas"))
+    return int(engine.get_global_value_address("formulas"))
 
 
 class _Module:
-    """The module with the function of some groups."""
+    """The module with the functions of some groups, and their table."""
 
     def __init__(self, groups: Sequence[Group]) -> None:
         from llvmlite import ir
@@ -114,21 +118,16 @@ class _Module:
         self.double, self.whole = ir.DoubleType(), ir.IntType(64)
         self.module = ir.Module("formulas")
         self.lowest = self.lowest_of(groups[LOWEST])
-        function = self.function("formulas", ir.VoidType(), [self.whole, self.double.as_pointer()])
-        self.end = function.append_basic_block("end")
-        ir.IRBuilder(self.end).ret_void()
-        branch = ir.IRBuilder(function.entry_basic_block).switch(function.args[-2], self.end)
-        for place, group in enumerate(groups):
-            block = function.append_basic_block(f"group{place}")
-            branch.add_case(ir.Constant(self.whole, place), block)
-            self.write(function, ir.IRBuilder(block), place, group)
+        made = [self.write(place, group) for place, group in enumerate(groups)]
+        kind = ir.ArrayType(made[0].type, len(made))
+        table = ir.GlobalVariable(self.module, kind, "formulas")
+        table.global_constant, table.initializer = True, ir.Constant(kind, made)
 
     def function(self, name: str, result: Any, more: list[Any]) -> Any:
         """A function of parameters, names and mode, with what comes behind them."""
         numbers = self.double.as_pointer()
         form = self.ir.FunctionType(result, [numbers, *[self.double] * len(NAMES), self.whole, *more])
         function = self.ir.Function(self.module, form, name)
-        # the entry stands before the end
         function.append_basic_block("entry")
         return function
 
@@ -140,12 +139,14 @@ class _Module:
         build.ret(value)
         return function
 
-    def write(self, function: Any, build: Any, place: int, group: Group) -> None:
-        """The code of one group."""
+    def write(self, place: int, group: Group) -> Any:
+        """The function of one group."""
+        function = self.function(f"group{place}", self.ir.VoidType(), [self.double.as_pointer()])
+        build = self.ir.IRBuilder(function.entry_basic_block)
         common = function.args[: 2 + len(NAMES)]
         if place == LOWEST:
             self.store(function, build, [build.call(self.lowest, common)])
-            return
+            return function
         made = _Values(self.ir, build, self.module, function.args)
         reached = [each.reached for each in group.guards]
         found = made.of([*group.values, *(each.part for each in group.guards), *reached])
@@ -156,20 +157,21 @@ class _Module:
             one = build.and_(made.outside[guard.part], build.fcmp_ordered(">", way, made.constant(0.5)))
             outside = one if outside is None else build.or_(outside, one)
         if outside is not None:
-            rare, usual = (function.append_basic_block(f"{word}{place}") for word in ("outside", "inside"))
+            rare, usual = (function.append_basic_block(word) for word in ("outside", "inside"))
             build.cbranch(outside, rare, usual)
             build = self.ir.IRBuilder(rare)
             clear = build.fcmp_unordered(">", build.call(self.lowest, common), made.constant(CLEAR))
             self.store(function, build, [build.select(clear, made.constant(math.nan), each) for each in values])
             build = self.ir.IRBuilder(usual)
         self.store(function, build, values)
+        return function
 
     def store(self, function: Any, build: Any, values: list[Any]) -> None:
         """Write the values, and 0 behind them, and return."""
         for place in range(WIDTH):
             value = values[place] if place < len(values) else self.ir.Constant(self.double, 0.0)
             build.store(value, build.gep(function.args[-1], [self.ir.Constant(self.whole, place)]))
-        build.branch(self.end)
+        build.ret_void()
 
 
 class _Values:

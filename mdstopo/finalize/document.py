@@ -250,11 +250,24 @@ def _objectives(stated: Plain, groups: Mapping[str, list[str]], told: list[str])
 def _looking(stated: Plain, groups: Mapping[str, list[str]]) -> list[Plain]:
     """What has a response, once for each group that `member_force` has now to look at."""
     response = stated["response"]
+    if isinstance(response, dict) and "expression" in response:
+        return [{**stated, "response": made} for made in _expressions(response["expression"], groups)]
+    return [{**stated, "response": made} for made in _forces(response, groups)]
+
+
+def _forces(response: Any, groups: Mapping[str, list[str]]) -> list[Any]:
+    """A response, once for each group that `member_force` has now to look at."""
     looks = isinstance(response, dict) and "member_force" in response
     group = str(response["member_force"]["group"]) if looks else ""
-    if group not in groups:
-        return [stated]
-    return [{**stated, "response": {"member_force": {"group": name}}} for name in groups[group]]
+    return [{"member_force": {"group": name}} for name in groups[group]] if group in groups else [response]
+
+
+def _expressions(stated: Plain, groups: Mapping[str, list[str]]) -> list[Plain]:
+    """An expression of responses, none where a member that it looks at is not kept."""
+    versions = {name: _forces(part, groups) for name, part in stated["of"].items()}
+    if not all(versions.values()):
+        return []
+    return [{"expression": {**stated, "of": {name: parts[0] for name, parts in versions.items()}}}]
 
 
 def _reason(versions: list[Plain]) -> str:

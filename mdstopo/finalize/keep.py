@@ -139,12 +139,12 @@ def _undone(case: Case, whole: Case, split: set[str]) -> Iterator[tuple[str, str
         return "" if group in (None, *names) else _nobody(str(group))
 
     for objective in case.objectives:
-        if message := lost(objective.response.group):
+        if message := next(filter(None, (lost(part.group) for part in objective.response.parts)), ""):
             yield f"objectives.{objective.name}", message
     upper = np.concatenate([case.upper, *(np.full(each.count, each.upper) for each in case.variables)])
     for i, row in enumerate(case.constraints):
         if not isinstance(row, VolumeRow):
-            if message := lost(row.response.group):
+            if message := next(filter(None, (lost(part.group) for part in row.response.parts)), ""):
                 yield f"constraints[{i}]", message
             continue
         most = row.spent(upper)

@@ -19,6 +19,7 @@ from mdstopo.formula.calculus import (
     simplified,
     substituted,
 )
+from mdstopo.formula.idle import Idle, idle_sides
 from mdstopo.formula.modes import (
     HALF,
     MOST_SWITCHES,
@@ -31,6 +32,7 @@ from mdstopo.formula.modes import (
     ways_to,
 )
 from mdstopo.formula.parser import parse
+from mdstopo.formula.sharp import sharp_switches
 from mdstopo.formula.tree import NUMBER, Expression, name, names_in, number, operation, parts
 
 #: groups that stand before those of parameters: the force, and the smallest margin
@@ -60,11 +62,17 @@ class Group(NamedTuple):
 
 
 class Program(NamedTuple):
-    """Groups of formulas, and how many parameters and switches they have."""
+    """Groups of formulas, and how many parameters and switches they have.
+
+    idle: on which sides of switches force and energy are 0. sharp: the switches, as bits, at which slopes of the force
+    begin with a root.
+    """
 
     groups: tuple[Group, ...]
     parameters: int
     switches: int
+    idle: tuple[Idle, ...]
+    sharp: int
 
     @property
     def has_timed_switches(self) -> bool:
@@ -159,7 +167,8 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
         groups += [group_of((divide(derivative(margin, word), size),)) for word in words]
     by_time = derivative(f, "t")
     groups.append(group_of((by_time,), limited([(by_time, ONE)])))
-    return Program(tuple(groups), len(names), len(found.switches))
+    sharp = sharp_switches(f, [switch.margin for switch in found.switches], MOTION)
+    return Program(tuple(groups), len(names), len(found.switches), idle_sides((f, v), looked_at), sharp)
 
 
 def group_of(values: tuple[Expression, ...], guards: Iterable[Guard] = ()) -> Group:

@@ -21,6 +21,7 @@ from mdstopo.formula.calculus import (
     is_number,
     multiply,
     negate,
+    power,
     rebuilt,
     subtract,
     where_not_zero,
@@ -115,6 +116,8 @@ class _Switches:
             return where_not_zero(u[0], lambda one: where_not_zero(u[1], lambda other: multiply(one, other)))
         if part.operator == "/":
             return where_not_zero(u[0], lambda one: divide(one, u[1]))
+        if part.operator == "^" and u[1].operator == NUMBER and u[1].value > 0.0:
+            return where_not_zero(u[0], lambda one: power(one, u[1]))
         return rebuilt(part, u)
 
     def either(self, margin: Expression, one: Expression, other: Expression) -> Expression:

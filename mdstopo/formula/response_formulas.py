@@ -8,11 +8,11 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
-from mdstopo.formula.calculus import ONE, derivative, is_number, substituted
+from mdstopo.formula.calculus import ONE, call, derivative, is_number, substituted
 from mdstopo.formula.law_formulas import Group, by_place, group_of, limited, lowest_of
 from mdstopo.formula.modes import smooth
 from mdstopo.formula.parser import TIME, parse
-from mdstopo.formula.tree import NUMBER, Expression, names_in
+from mdstopo.formula.tree import NUMBER, Expression, name, names_in
 
 #: group of the value and its slope by t; that of the smallest margin; the first of those with slopes by responses
 VALUE, LOWEST, SLOPES = 0, 1, 2
@@ -36,12 +36,17 @@ class ResponseProgram(NamedTuple):
 
 
 @functools.lru_cache(maxsize=256)
-def response_program(text: str, names: tuple[str, ...], responses: int) -> ResponseProgram:
+def response_program(
+    text: str, names: tuple[str, ...], responses: int, signed: tuple[int, ...] = ()
+) -> ResponseProgram:
     """Value, derivatives and switches of a formula. Raises TooManySwitchesError.
 
-    names: of the responses, which come first, and of the parameters. responses: how many they are.
+    names: of the responses, which come first, and of the parameters. responses: how many they are. signed: the places
+    of those that come with a sign, where the formula means the absolute value.
     """
-    root = substituted(parse(text).root, by_place(names))
+    known = by_place(names)
+    known |= {name(names[place]): call("abs", name(f"p {place}")) for place in signed}
+    root = substituted(parse(text).root, known)
     moving = [f"p {place}" for place in range(responses)]
     found = smooth((root,), (*moving, TIME))
     (f,) = found.formulas

@@ -2,7 +2,9 @@
 
 The stages, and what estimates a step's error, are those of the method that is chosen by its tag (`method_interface`).
 The end of a step is moved onto the joints (`projection`), by no more than the step's error, so the order stays. A step
-that a switching member's margin does not survive is shortened until it ends at the event.
+that a switching member's margin does not survive is shortened until it ends at the event. Where slopes of a force begin
+or end with a root, as those of x^1.5, a step is of low order for derivatives: there steps become shorter and longer by
+shares of the time to and from the event, and the last one is made anew, so that no stage lies behind the root.
 """
 
 import numpy as np
@@ -20,7 +22,7 @@ from mdstopo.general.events import (
 )
 from mdstopo.general.first_step import first_step, motion_scale
 from mdstopo.general.landing import CORRECTIONS, first_event, landing_of
-from mdstopo.general.locate import AIM
+from mdstopo.general.locate import AIM, NEAREST, is_sharp, step_beside_sharp, time_to_sharp, time_to_switch
 from mdstopo.general.locate import NEAR as NEAR_SWITCH
 from mdstopo.general.members import MODE, SET, meeting, scale_general
 from mdstopo.general.method_interface import UNSOLVED, is_explicit, make_stages, scheme, step_error
@@ -299,6 +301,11 @@ def run_adaptive(
     largest = sigma
     way = np.inf  # time until the next pose at which joints repeat each other
     must = True
+    ahead = np.inf  # when a switch is foreseen at which slopes begin with a root
+    sharp_one = -1  # whose it is
+    usual = 0.0  # length of a step before they became short for it
+    since = -np.inf  # when the last such one was
+    nearest = settings[0] ** NEAREST
     relative_pose(model, q0, v0, rel0)
     motion = np.zeros(n_pair)
     noise = np.empty(n_pair)
@@ -360,6 +367,15 @@ def run_adaptive(
             if way < np.inf and not fixed_step > 0.0:
                 beside = step_beside(h, way, must and sigma < CLOSE * largest, table[2, 0], s)
                 if beside < end - t:
+                    h = beside
+                    lands = False
+            if (ahead < np.inf or since > -np.inf) and not fixed_step > 0.0:
+                away = ahead - t
+                if sharp_one >= 0:
+                    relative_pose(model, q0, v0, before)
+                    away = min(away, time_to_switch(model, t, member_state, before, sharp_one))
+                beside = step_beside_sharp(away, t - since, nearest * longest)
+                if beside < min(h, end - t):
                     h = beside
                     lands = False
             if not h > 1e-14 * max(abs(t), abs(end)) or h < 1e-15 * span:
@@ -459,7 +475,23 @@ def run_adaptive(
                         continue
                     c, who, rate = first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, where)
                 happens = c <= 1.0
-                if happens and (settings[4] != 0.0 or not explicit):
+                sharp = np.bool_(False)
+                if happens and not fixed_step > 0.0:
+                    relative_pose(model, step.at_q, step.at_v, step.rel)
+                    sharp = is_sharp(model, t + c * h, member_state, step.rel, who)
+                until = c * h if sharp else 0.0
+                if not happens and not fixed_step > 0.0:
+                    until, who = time_to_sharp(model, t + h, member_state, rel, watched)
+                    until = until + h if until < 0.5 * h else 0.0
+                if until > nearest * max(longest, h):
+                    ahead = t + until
+                    usual = wanted if sharp_one < 0 else usual
+                    sharp_one = who
+                    must = False
+                    work[REJECTED] += 1
+                    work[OF_REJECTED] += INSIDE if c < 2.0 else s
+                    continue
+                if happens and (settings[4] != 0.0 or sharp or not explicit):
                     work[OF_SWITCHES] += s
                     h, happens, singular = advance_to_switch(
                         tag, step, table, s, segment, t, h, c, rate, rounding, keep, stages, lam, history, end_q, end_v,
@@ -495,6 +527,9 @@ def run_adaptive(
             happened = events
             ended = h if measures and own == s and not happens else 0.0
             t = end if lands else t + h
+            if happens or t >= ahead:
+                ahead = np.inf
+                sharp_one = -1
             longest = max(longest, h)
             copy_vector(end_q, q0)
             copy_vector(end_v, v0)
@@ -516,6 +551,11 @@ def run_adaptive(
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
+                if is_sharp(model, t, member_state, rel, who):
+                    since = t
+                else:
+                    wanted = max(wanted, usual)
+                usual = 0.0
                 crowd = crowd + 1 if t - crowd_time < 1e-6 * span else 0
                 if crowd == 0:
                     crowd_time = t

@@ -28,9 +28,11 @@ from mdstopo.general.responses import (
     across_rate,
     across_slopes,
     chosen_part,
+    design_slopes,
     energy_weight,
     equal_forces,
     has_energy,
+    has_forces,
     has_switches,
     kinked,
     members_of,
@@ -214,10 +216,11 @@ def row_cotangents(
         across_slopes(model, j, q, v, a, lam, bars, row_bar)
     else:
         response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
-    weight = energy_weight(model, member_state, segment, j, who, t, q, v, a, lam, workspace)
+    slopes = design_slopes(model, member_state, segment, j, who, t, q, v, a, lam, workspace)
+    weight = energy_weight(model, j, slopes)
     if bar_set.shape[0] > 0:
         bar_set[:] = 0.0
-        add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, weight, 1.0, bar_set)
+        add_looked_sets(model, member_state, segment, j, who, slopes, t, q, v, a, bars, 1.0, bar_set)
     z = bars[2]
     factor_matrix(
         model,
@@ -237,7 +240,7 @@ def row_cotangents(
     free_only(model, bars[1])
     add_design(model, segment, t, member_state, q, v, a, z, weight, out, work)
     sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
-    explicit_part(model, segment, j, who, t, member_state, q, v, a, sign, out)
+    explicit_part(model, segment, j, who, slopes, t, member_state, q, v, a, sign, out)
     if bar_set.shape[0] > 0:
         add_sets(model, segment, member_state, q, v, z, 0.0, bar_set)
     at = k if c <= 0.0 else k + 1
@@ -563,8 +566,9 @@ def integral_cotangents(
     total = 0.0
     out[:] = 0.0
     none = np.zeros(n)
+    of_parts = np.zeros(0)
     kind = model.response[j, KIND]
-    energy = has_energy(model, j)
+    designed = has_energy(model, j) or has_forces(model, j)
     bends = kinked(model, j)
     switches = has_switches(model, j)
     slopes = np.zeros((3, n))
@@ -618,14 +622,15 @@ def integral_cotangents(
             total += weight[i] * (value * value if square else value)
             if not gradient:
                 continue
-            weighed = 0.0
-            if energy:
-                weighed = energy_weight(
+            if designed:
+                of_parts = design_slopes(
                     model, member_state, segment, j, who, t, q, v, a, history.lam[o + i], workspace
                 )  # fmt: skip
-                if turned:
-                    weighed = -weighed
-                add_design(model, segment, t, member_state, q, v, a, none, factor * weighed, out, work)
+                for m in range(of_parts.shape[0]):
+                    of_parts[m] = -of_parts[m] if turned else of_parts[m]
+                weighed = energy_weight(model, j, of_parts)
+                if weighed != 0.0:
+                    add_design(model, segment, t, member_state, q, v, a, none, factor * weighed, out, work)
             shares = ties if who == mine and ties > 1 else 1
             factor /= shares
             bars[o + i] = 0.0
@@ -641,11 +646,11 @@ def integral_cotangents(
                 for r in range(n_row):
                     rows_bar[o + i, r] = factor * own_rows[r]
                 sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
-                if turned:
+                if turned and kind == MEMBER_FORCE:
                     sign = -sign
-                explicit_part(model, segment, j, who, t, member_state, q, v, a, factor * sign, out)
+                explicit_part(model, segment, j, who, of_parts, t, member_state, q, v, a, factor * sign, out)
                 if sets_bar.shape[1] > 0:
                     add_looked_sets(
-                        model, member_state, segment, j, who, t, q, v, a, own, weighed, factor, sets_bar[o + i]
+                        model, member_state, segment, j, who, of_parts, t, q, v, a, own, factor, sets_bar[o + i]
                     )  # fmt: skip
     return total

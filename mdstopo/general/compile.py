@@ -11,6 +11,7 @@ from mdstopo.case.model import GROUND, Case, LoadCase, Response, ResponseRow
 from mdstopo.case.responses import kind_of
 from mdstopo.general import responses as responses_of
 from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in_frame
+from mdstopo.general.driven_integrals import integration_times
 from mdstopo.general.drives import Drives, drives, drives_all, motion_times
 from mdstopo.general.expression_rows import expression_codes, expression_data
 from mdstopo.general.layout import arrange
@@ -99,8 +100,10 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         v0[own] = dimension.velocities(body, home[i])
 
     fine = has_coarse_steps(case.solver)
+    kinks_of_formulas = kink_times(case, load_case)
     more = (
-        kink_times(case, load_case)
+        kinks_of_formulas
+        + integration_times(case, load_case, kinks_of_formulas)
         + lasting_times(case, fine)
         + motion_times(load_case, dimension)
         + watched_times(case, load_case)

@@ -14,7 +14,7 @@ from mdstopo.general.gather import add_design, explicit_part, force_sign
 from mdstopo.general.members import unscale_general
 from mdstopo.general.method_interface import point_of
 from mdstopo.general.model import unpack_general
-from mdstopo.general.responses import energy_weight, response
+from mdstopo.general.responses import design_slopes, energy_weight, response
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import most_rows
@@ -85,10 +85,11 @@ def hold(
     response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
     if z.shape[0] > 0:
         padded[:] = 0.0
-        weight = energy_weight(model, member_state, segment, j, who, t, q, v, a, lam, workspace)
+        slopes = design_slopes(model, member_state, segment, j, who, t, q, v, a, lam, workspace)
+        weight = energy_weight(model, j, slopes)
         add_design(model, segment, t, member_state, q, v, a, z, weight, padded, work)
         sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
-        explicit_part(model, segment, j, who, t, member_state, q, v, a, sign, padded)
+        explicit_part(model, segment, j, who, slopes, t, member_state, q, v, a, sign, padded)
         unscale_general(model.block, model.power, alpha, padded, out)
         return
     general_forces(model, member_state, segment, t, q, v, np.bool_(True), workspace)

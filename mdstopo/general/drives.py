@@ -1,7 +1,8 @@
 """Prescribed motions as cubics of time: the driven coordinates of a load case, segment by segment.
 
 Linear accelerations, linear velocities and cubic splines of positions are all cubics between their rows; what is
-prescribed as acceleration or velocity is integrated from the body's own start.
+prescribed as acceleration or velocity is integrated from the body's own start. Formulas are called by kernels, which
+need of the cubics where a segment begins alone.
 """
 
 from typing import NamedTuple
@@ -12,7 +13,8 @@ from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import LoadCase, Motion, Prescribed, Table
 from mdstopo.case.spline import slopes
 from mdstopo.general.dimension import Dimension
-from mdstopo.general.timed_loads import at_ends, modes, row_of_formula
+from mdstopo.general.driven_integrals import integrated_ends, row_of_motion
+from mdstopo.general.timed_loads import at_ends, modes
 from mdstopo.mechanics.kinematics.spatial_drives import FRAME, ROW
 from mdstopo.mechanics.kinematics.timed import WIDTH
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -70,7 +72,7 @@ def drives(
     each = dimension.kinematics.freedoms
     driven: list[int] = []
     cubics: list[FloatArray] = []
-    formulas: dict[int, TimeFormula] = {}
+    formulas: dict[int, tuple[TimeFormula, str]] = {}
     frames = np.zeros((0, FRAME))
     turns = np.zeros((0, ROW))
     for motion in load_case.motions:
@@ -79,7 +81,7 @@ def drives(
             part: Prescribed | None = getattr(motion, word)
             if part is not None:
                 if isinstance(part.signal, TimeFormula):
-                    formulas[len(driven)] = part.signal.shifted(-float(home[d]))
+                    formulas[len(driven)] = _from_home(part, float(home[d])), part.kind
                 driven.append(d)
                 cubics.append(cubics_of(part, times, float(home[d]), float(v0[d])))
         if motion.rotation is not None:
@@ -90,7 +92,7 @@ def drives(
             found = turning_of(motion.rotation, times, attitudes[body], v0[first : first + 3])
             for k, angle in enumerate(motion.rotation.angles):
                 if isinstance(angle.signal, TimeFormula):
-                    formulas[len(driven) + k] = angle.signal
+                    formulas[len(driven) + k] = angle.signal, angle.kind
             driven += [first, first + 1, first + 2]
             cubics += list(found.cubics.transpose(1, 0, 2))
             ends = float(len(turns)), float(len(turns) + len(found.rows))
@@ -98,8 +100,8 @@ def drives(
             turns = np.vstack([turns, found.rows])
     whole = np.array(cubics).reshape(len(cubics), len(times) - 1, 4).transpose(1, 0, 2)
     rows, sides = np.zeros((len(driven), WIDTH)), np.zeros((len(times) - 1, len(driven)), dtype=np.int64)
-    for i, formula in formulas.items():
-        rows[i], sides[:, i] = row_of_formula(formula), modes(formula, times)
+    for i, (formula, kind) in formulas.items():
+        rows[i], sides[:, i] = row_of_motion(formula, kind), modes(formula, times)
     return Drives(np.array(driven, dtype=np.int64), np.ascontiguousarray(whole), frames, turns, rows, sides)
 
 
@@ -109,8 +111,10 @@ def cubics_of(part: Prescribed, times: FloatArray, home: float, rate: float) -> 
     rate: at the start, from which an acceleration is integrated.
     """
     if isinstance(part.signal, TimeFormula):
-        ends = at_ends(part.signal.shifted(-home), times)
-        # kernels call the formula; these are for those who ask where, and how fast, it is at a segment's ends
+        if part.kind == "position":
+            ends = at_ends(_from_home(part, home), times)
+        else:
+            ends = integrated_ends(row_of_motion(part.signal, part.kind), modes(part.signal, times), times, 0.0, rate)
         return _cubics_between(ends, np.diff(times))
     if part.kind == "position":
         return _spline_cubics(part.signal, times, home)
@@ -128,6 +132,12 @@ def cubics_of(part: Prescribed, times: FloatArray, home: float, rate: float) -> 
         position = cubic[0] + h * (cubic[1] + h * (cubic[2] + h * cubic[3]))
         velocity = cubic[1] + h * (2.0 * cubic[2] + 3.0 * h * cubic[3])
     return out
+
+
+def _from_home(part: Prescribed, home: float) -> TimeFormula:
+    """The formula of what is prescribed; of a position, less that at home."""
+    assert isinstance(part.signal, TimeFormula)
+    return part.signal.shifted(-home) if part.kind == "position" else part.signal
 
 
 def _cubics_between(ends: FloatArray, h: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ from mdstopo.case.aims import Response
 from mdstopo.case.expression_response import program_of
 from mdstopo.case.responses import kind_of
 from mdstopo.compiler.formulas import address_of
-from mdstopo.general.expressions import BALANCED, BY_STATE, ENERGETIC, EXPRESSION, ROOT, TIMED
+from mdstopo.general.expressions import BALANCED, BY_STATE, ENERGETIC, EXPRESSION, FORCED, ROOT, TIMED
 from mdstopo.general.responses import LISTED, code_of
 
 
@@ -20,6 +20,7 @@ def expression_codes(response: Response, first: int) -> list[int]:
         (made.is_norm, ROOT),
         (any(kind.is_energy for kind in kinds), ENERGETIC),
         (made.is_timed, TIMED),
+        (any(kind.of_members for kind in kinds), FORCED),
     ):
         known += bit if holds else 0
     return [EXPRESSION, first, len(kinds), known, max(kind.order for kind in kinds), made.switches]

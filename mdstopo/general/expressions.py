@@ -18,8 +18,9 @@ EXPRESSION = -1
 #: its columns of `GeneralModel.response` beside KIND and ORDER: the first of the responses that it is of, how many they
 #: are, what is known of it, and how many switches it has
 FIRST_PART, PARTS, KNOWN, SWITCHES = BODY, REFERENCE, COMPONENT, SUBJECT
-#: what is known, as bits: it needs a balance; its rate is g_q v + g_v a; it is a root; stored energy, and t, are in it
-BALANCED, BY_STATE, ROOT, ENERGETIC, TIMED = 1, 2, 4, 8, 16
+#: what is known, as bits: it needs a balance; its rate is g_q v + g_v a; it is a root; stored energy, t, and forces of
+#: members are in it
+BALANCED, BY_STATE, ROOT, ENERGETIC, TIMED, FORCED = 1, 2, 4, 8, 16, 32
 #: its data, from the place in `response_par`: where its formulas are, groups of slopes, parameters, and then these
 ADDRESS, GROUPS, COUNT, NUMBERS = range(4)
 #: above the bits of all switches

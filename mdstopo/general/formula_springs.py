@@ -1,10 +1,11 @@
-"""Laws by formula that are linear springs become springs, which have vectors over many members; formulas have none."""
+"""Laws by formula that are springs, linear or cubic, become the built-in ones, which are computed faster."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+from mdstopo.case.laws.cubic import CubicLaw
 from mdstopo.case.laws.expression import OfFormulas, names_of
 from mdstopo.case.laws.spring import SpringLaw
 from mdstopo.case.model import Case, Law, MemberGroup
@@ -20,10 +21,11 @@ MOST_TERMS = 12
 Place = tuple[str, int]
 
 
-def spring_of(law: Law) -> tuple[SpringLaw, dict[str, str]] | None:
+def spring_of(law: Law) -> tuple[SpringLaw | CubicLaw, dict[str, str]] | None:
     """The spring that a law by formula is, and what each parameter of the formula is there; None of other laws.
 
-    Force and energy have to be k x + c xd + p and k x^2 / 2, where each of k, c and p is a number or another parameter.
+    Force and energy have to be k x + c xd + p and k x^2 / 2, or k x + b x^3 and k x^2 / 2 + b x^4 / 4, where each of k,
+    c, p and b is a number or another parameter.
     """
     if not isinstance(law, OfFormulas) or law.program.switches:
         return None
@@ -31,14 +33,24 @@ def spring_of(law: Law) -> tuple[SpringLaw, dict[str, str]] | None:
     force, energy = polynomial(f), polynomial(v)
     if force is None or energy is None:
         return None
-    shares = [_share(force, word) for word in ("x", "xd", "")]
-    squared = {tuple(sorted((*monomial, "x", "x"))): factor / 2 for monomial, factor in shares[0].items()}
-    if sum(map(len, shares)) != len(force) or energy != squared:
-        return None
+    linear = {"stiffness": _share(force, "x"), "damping": _share(force, "xd"), "preload": _share(force)}
+    if sum(map(len, linear.values())) == len(force) and energy == _stored({2: linear["stiffness"]}):
+        return _made(law, SpringLaw, linear)
+    cubic = {"stiffness": _share(force, "x"), "cubic": _share(force, "x", "x", "x")}
+    stored = _stored({2: cubic["stiffness"], 4: cubic["cubic"]})
+    if sum(map(len, cubic.values())) == len(force) and energy == stored:
+        return _made(law, CubicLaw, cubic)
+    return None
+
+
+def _made(
+    law: OfFormulas, kind: type[SpringLaw] | type[CubicLaw], shares: Mapping[str, Polynomial]
+) -> tuple[SpringLaw | CubicLaw, dict[str, str]] | None:
+    """The law of a kind with these shares of the force as its parameters; None where one is no number and no name."""
     words = names_of(type(law))
     numbers: dict[str, float] = {}
     taken: dict[str, str] = {}
-    for parameter, share in zip(("stiffness", "damping", "preload"), shares, strict=True):
+    for parameter, share in shares.items():
         if not share.keys() - {()}:
             numbers[parameter] = float(share.get((), 0))
             continue
@@ -48,17 +60,26 @@ def spring_of(law: Law) -> tuple[SpringLaw, dict[str, str]] | None:
             return None
         numbers[parameter], taken[word] = law.values[word], parameter
     common: dict[str, Any] = {key: getattr(law, key) for key in COMMON}
-    return SpringLaw(**numbers, **common), taken
+    return kind(**numbers, **common), taken
 
 
-def _share(form: Polynomial, word: str) -> Polynomial:
-    """What a name of the motion alone is multiplied with, in parameters; without a word: what stands for itself."""
+def _share(form: Polynomial, *words: str) -> Polynomial:
+    """What a product of names of the motion is multiplied with, in parameters; without a name: what stands alone."""
     found = {}
     for monomial, factor in form.items():
         moved = [each for each in monomial if not each.startswith("p ")]
-        if moved == ([word] if word else []):
+        if moved == list(words):
             found[tuple(each for each in monomial if each.startswith("p "))] = factor
     return found
+
+
+def _stored(shares: Mapping[int, Polynomial]) -> Polynomial:
+    """The sum of shares times x to their power, each by that power."""
+    return {
+        tuple(sorted((*monomial, *["x"] * power))): factor / power
+        for power, share in shares.items()
+        for monomial, factor in share.items()
+    }
 
 
 def polynomial(root: Expression) -> Polynomial | None:
@@ -90,8 +111,11 @@ def _polynomial(part: Expression, operands: Sequence[Polynomial | None]) -> Poly
         return None
     if part.operator == "/":
         return _product(first, {(): 1 / factor})
-    if part.operator == "^" and factor in (1, 2):
-        return first if factor == 1 else _product(first, first)
+    if part.operator == "^" and factor in (1, 2, 3, 4):
+        power = first
+        for _ in range(int(factor) - 1):
+            power = _product(power, first)
+        return power
     return None
 
 
@@ -123,7 +147,7 @@ def with_springs(case: Case) -> Case:
     return replace(case, members=tuple(_changed(group, found) for group in case.members), variables=variables)
 
 
-def _renamed(case: Case, found: dict[Place, tuple[SpringLaw, dict[str, str]]]) -> Mapping[str, str]:
+def _renamed(case: Case, found: dict[Place, tuple[SpringLaw | CubicLaw, dict[str, str]]]) -> Mapping[str, str]:
     """What each variable of springs is called there; springs with a variable that cannot be renamed are taken out."""
     renamed: dict[str, str] = {}
     pending = True
@@ -151,7 +175,7 @@ def _is_of(case: Case, variable: str, found: Mapping[Place, Any]) -> bool:
     return all(place in found for place in zip(each.groups, each.laws, strict=True))
 
 
-def _changed(group: MemberGroup, found: Mapping[Place, tuple[SpringLaw, Any]]) -> MemberGroup:
+def _changed(group: MemberGroup, found: Mapping[Place, tuple[SpringLaw | CubicLaw, Any]]) -> MemberGroup:
     laws = tuple(
         found[group.name, place][0] if (group.name, place) in found else law for place, law in enumerate(group.laws)
     )

@@ -3,6 +3,7 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.general.expressions import FIRST_PART
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import MODE, SET, level_of, rate_of_row
 from mdstopo.general.model import (
@@ -161,14 +162,15 @@ def _virtual(model, rel, p, z, out):
 
 
 @kernel
-def explicit_part(model, segment, j, who, t, member_state, q, v, a, scale, out):
-    """What the design does to g_j at fixed motion, where g_j is the force f* of a member.
+def explicit_part(model, segment, j, who, slopes, t, member_state, q, v, a, scale, out):
+    """What the design does to g_j at fixed motion, where g_j is the force f* of a member, or of such forces.
 
     f* has a sign; its absolute value is what is looked at (`force_sign`).
 
     Constant:
       model: the compiled scene.
       j, who: the response, and the number of the member in its group.
+      slopes (PARTS,): of an expression by what it is of (`design_slopes`).
       segment, t: segment of `model.times`, and time in it (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
@@ -176,11 +178,33 @@ def explicit_part(model, segment, j, who, t, member_state, q, v, a, scale, out):
     Out:
       out (M_padded + P,): scale times the derivative of f* by alpha^mu and by parameters, added to.
     """
-    if model.response[j, KIND] != MEMBER_FORCE:
+    if model.response[j, KIND] == MEMBER_FORCE:
+        _explicit_force(model, segment, model.response[j, SUBJECT], who, t, member_state, q, v, a, scale, out)
         return
-    _add_laws(model, segment, j, who, t, member_state, q, v, a, scale, out)
+    for m in range(slopes.shape[0]):
+        c = model.response[j, FIRST_PART] + m
+        if model.response[c, KIND] == MEMBER_FORCE and slopes[m] != 0.0:
+            group = model.response[c, SUBJECT]
+            _explicit_force(model, segment, group, 0, t, member_state, q, v, a, scale * slopes[m], out)
+
+
+@kernel
+def _explicit_force(model, segment, group, who, t, member_state, q, v, a, scale, out):
+    """What the design does to the force f* of one member at fixed motion.
+
+    Constant:
+      model: the compiled scene.
+      group, who: the group, and the number of the member in it.
+      segment, t: segment of `model.times`, and time in it (s).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+      scale: factor of df*.
+    Out:
+      out (M_padded + P,): scale times the derivative of f* by alpha^mu and by parameters, added to.
+    """
+    _add_laws(model, segment, group, who, t, member_state, q, v, a, scale, out)
     if model.varied.shape[0] > 0:
-        add_force_parameters(model, segment, model.response[j, SUBJECT], who, t, member_state, q, v, a, scale, out)
+        add_force_parameters(model, segment, group, who, t, member_state, q, v, a, scale, out)
 
 
 @kernel
@@ -206,12 +230,12 @@ def force_sign(model, segment, j, who, t, member_state, q, v, a):
 
 
 @kernel
-def _add_laws(model, segment, j, who, t, member_state, q, v, a, scale, out):
+def _add_laws(model, segment, group, who, t, member_state, q, v, a, scale, out):
     """The forces of all laws of a member at unit strength, each to its own place.
 
     Constant:
       model: the compiled scene.
-      j, who: the response, which names the group, and the number of the member in it.
+      group, who: the group, and the number of the member in it.
       segment, t: segment of `model.times`, and time in it (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
@@ -223,7 +247,7 @@ def _add_laws(model, segment, j, who, t, member_state, q, v, a, scale, out):
     rel = np.empty((model.pair.shape[0], pose_size(model)))
     relative_pose(model, q, v, rel)
     for k in range(model.block.shape[0]):
-        if model.block[k, GROUP] != model.response[j, SUBJECT] or model.active[segment, k] == 0:
+        if model.block[k, GROUP] != group or model.active[segment, k] == 0:
             continue
         if who < model.block[k, OFFSET] or who >= model.block[k, OFFSET] + model.block[k, COUNT]:
             continue

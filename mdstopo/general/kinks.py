@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mdstopo.general.driven_integrals import integrated_ends
 from mdstopo.general.extremes import FRACTION, STEP, VALUE, EvaluateAt
 from mdstopo.general.minima import LOW, Pieces
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.responses import has_kinks, has_norm, is_expression
+from mdstopo.mechanics.kinematics.timed import COORDINATE, DERIVED
 from mdstopo.scene.model import FloatArray
 
 if TYPE_CHECKING:
@@ -118,6 +120,10 @@ def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
         ],
         axis=-1,
     )
+    for i in np.flatnonzero(model.driven_par[:, DERIVED] != COORDINATE).tolist():
+        row, sides = model.driven_par[i], model.driven_mode[parent, i]
+        start = drive[0, i, 0], drive[0, i, 1]
+        drive[:, i, :2] = integrated_ends(row, sides, whole, *start)[:, 0]
     return model._replace(
         times=whole,
         active=model.active[parent],

@@ -17,8 +17,20 @@ from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.model import CODE, MEMBER_FREE_LENGTH, PAIR
 from mdstopo.general.step_history import copy_vector
 from mdstopo.mechanics.contact import contact_grazes
-from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic, relative_pose, stretch_of
-from mdstopo.mechanics.laws.table import law_grazes
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    drive_state,
+    member_motion,
+    quintic,
+    relative_pose,
+    stretch_of,
+)
+from mdstopo.mechanics.laws.table import (
+    law_grazes,
+    law_is_sharp,
+    law_margin,
+    law_margin_by_time,
+    law_margin_slopes,
+)
 
 #: trials of the moment of one event
 TRIALS = 100
@@ -29,6 +41,9 @@ NEAR, AIM = 50.0, 5.0
 #: trials that are foreseen; evaluations of the quintic's margin for its root, and how near that is found; by which
 #: share of the piece its rate is differenced
 FORESEEN, LAPS, CLOSE, BESIDE = 8, 40, 1e-9, 1e-4
+#: steps beside a switch at which slopes begin with a root: relative to the time from it and to it; the shortest are the
+#: longest one so far times the tolerance to this power
+LEAVE, APPROACH, NEAREST = 1.0, 0.5, 0.65
 
 
 @kernel
@@ -251,3 +266,69 @@ def matters(model, t, member_state, rel, i):
     rest = model.member[MEMBER_FREE_LENGTH, i]
     mode = int(member_state[MODE, i])
     return law_grazes(model.block[k, CODE], model.law[k], x, mode, t, model.curves, rest) == 2
+
+
+@kernel
+def is_sharp(model, t, member_state, rel, i):
+    """Whether slopes of the force of member or contact i begin with a root at the switch that is nearest to it.
+
+    t, rel (n_pair, POSE): that time (s), and relative poses then.
+    """
+    if i < 0 or i >= model.member.shape[1]:
+        return False
+    k = block_of(model, i)
+    _, x, rate = member_motion(model, i, rel[model.block[k, PAIR]])
+    x -= member_state[SET, i]
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    mode = int(member_state[MODE, i])
+    return law_is_sharp(model.block[k, CODE], model.law[k], x, rate, mode, t, model.curves, rest)
+
+
+@kernel
+def time_to_switch(model, t, member_state, rel, i):
+    """When the margin of member i is used up at its present rate, s from now; infinite where that is not known.
+
+    t, rel (n_pair, POSE): that time (s), and relative poses then.
+    """
+    k = block_of(model, i)
+    code = model.block[k, CODE]
+    _, x, rate = member_motion(model, i, rel[model.block[k, PAIR]])
+    x -= member_state[SET, i]
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    mode = int(member_state[MODE, i])
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
+    speed = by_x * rate + law_margin_by_time(code, model.law[k], x, rate, mode, t, model.curves, rest)
+    if by_rate != 0.0 or not speed < 0.0:
+        return np.inf
+    return -law_margin(code, model.law[k], x, rate, mode, t, model.curves, rest) / speed
+
+
+@kernel
+def time_to_sharp(model, t, member_state, rel, watched):
+    """When the first of the watched members comes to a switch at which slopes begin with a root, s from now, and which.
+
+    t, rel (n_pair, POSE): that time (s), and relative poses then. watched: the members (`events.watch_near`).
+
+    Infinite, -1 where none is known to do so.
+    """
+    first = np.inf
+    who = -1
+    for m in range(1, watched[0] + 1):
+        i = watched[m]
+        if is_sharp(model, t, member_state, rel, i):
+            away = time_to_switch(model, t, member_state, rel, i)
+            if away < first:
+                first = away
+                who = i
+    return first, who
+
+
+@kernel
+def step_beside_sharp(away, since, near):
+    """How long a step may be beside switches at which slopes begin with a root: by the time from and to them (s).
+
+    away: how long it is to the next such switch, infinite: none is foreseen. since: how long ago the last one was.
+    near: how long the steps right beside them are (s).
+    """
+    most = near + LEAVE * since
+    return min(most, APPROACH * away) if away > near else min(most, 2.0 * near)

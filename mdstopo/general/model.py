@@ -91,10 +91,10 @@ class GeneralModel(NamedTuple):
     timed_arm: Annotated[FloatArray, Field("n_timed_load, 6", "of these: the direction, the point of attack (m)")]
     timed_par: Annotated[
         FloatArray,
-        Field("n_timed_load, 11", "their formulas: parameters, machine code, factor, summand (`kinematics.timed`)"),
+        Field("n_timed_load, 12", "their formulas: parameters, machine code, factor, summand (`kinematics.timed`)"),
     ]
     timed_mode: Annotated[IndexArray, Field("n_seg, n_timed_load", "bits of the formulas' switches in a segment")]
-    driven_par: Annotated[FloatArray, Field("n_driven, 11", "as `timed_par`, of freedoms that formulas drive")]
+    driven_par: Annotated[FloatArray, Field("n_driven, 12", "as `timed_par`, of freedoms that formulas drive")]
     driven_mode: Annotated[IndexArray, Field("n_seg, n_driven", "bits of these formulas' switches in a segment")]
     bushing_pair: Annotated[IndexArray, Field("n_bushing", "the pair that a bushing connects")]
     bushing: Annotated[FloatArray, Field("n_bushing, n_elastic", "P, Q, its stretch at home, stiffness, damping")]

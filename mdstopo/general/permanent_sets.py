@@ -18,6 +18,7 @@ Sets are counted through the blocks of the law, in their order: slots.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.general.expressions import FIRST_PART
 from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.model import (
     ALONG_FREE_LENGTH,
@@ -40,7 +41,7 @@ from mdstopo.general.model import (
     VARIED_VALUE,
 )
 from mdstopo.general.parameters import moved_side, varies_member
-from mdstopo.general.responses import MEMBER_FORCE, member_force
+from mdstopo.general.responses import MEMBER_FORCE, energy_weight, member_force
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,
@@ -191,8 +192,9 @@ def add_sets_of_rows(model, segment, member_state, history, at, z, j, out):
 
 
 @kernel
-def add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, scale, out):
-    """Add the derivatives, at fixed motion, of a member force by the permanent sets; of other responses there are none.
+def add_explicit_sets(model, member_state, segment, j, who, slopes, t, q, v, a, bars, scale, out):
+    """Add the derivatives, at fixed motion, of forces of members by the permanent sets; of other responses there are
+    none.
 
     Constant:
       model: the compiled scene.
@@ -201,6 +203,7 @@ def add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, sc
       segment: number of the stretch of time between two breakpoints.
       j: the response.
       who: number of the member in its group.
+      slopes (PARTS,): of an expression by what it is of (`design_slopes`).
       t: time (s).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       bars (3, n): slopes of the response by q, v, a, which tell the sign of the force.
@@ -208,18 +211,41 @@ def add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, sc
     Out:
       out (slots,): derivatives by the sets, added to.
     """
+    for m in range(slopes.shape[0]):
+        c = model.response[j, FIRST_PART] + m
+        if model.response[c, KIND] == MEMBER_FORCE and slopes[m] != 0.0:
+            group = model.response[c, SUBJECT]
+            _add_force_sets(model, member_state, segment, group, 0, q, v, scale * slopes[m], out)
     if model.response[j, KIND] != MEMBER_FORCE:
         return
-    row = np.empty(pair_freedoms(model))
-    row_rate = np.empty(pair_freedoms(model))
-    slopes = np.empty((3, pair_freedoms(model)))
+    by_state = np.empty((3, pair_freedoms(model)))
     own = np.empty((2, pair_freedoms(model)))
     group = model.response[j, SUBJECT]
-    _, pair = member_force(model, member_state, segment, t, group, who, q, v, a, slopes, own)
+    _, pair = member_force(model, member_state, segment, t, group, who, q, v, a, by_state, own)
     along = 0.0  # the force may be zero here; then its slopes tell its sign
     for c in range(pair_freedoms(model)):
-        along += slopes[0, c] * bars[0, place_in_pair(model, pair, c)]
+        along += by_state[0, c] * bars[0, place_in_pair(model, pair, c)]
     sign = 1.0 if along >= 0.0 else -1.0
+    _add_force_sets(model, member_state, segment, group, who, q, v, scale * sign, out)
+
+
+@kernel
+def _add_force_sets(model, member_state, segment, group, who, q, v, scale, out):
+    """Add scale times the derivatives, at fixed motion, of the force f* of one member by the permanent sets.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      group, who: the group, and the number of the member in it.
+      q (n_q,), v (n,): coordinates and velocities.
+      scale: factor of the derivatives.
+    Out:
+      out (slots,): added to.
+    """
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     slot = 0
     for k in range(model.block.shape[0]):
         if not law_remembers(model.block[k, CODE]):
@@ -234,12 +260,12 @@ def add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, sc
             i = model.block[k, START] + own_i
             x, _ = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
             force, _ = set_slopes(model, k, i, member_state, x - member_state[SET, i], 0.0)
-            out[slot + own_i] += scale * sign * force
+            out[slot + own_i] += scale * force
         slot += model.block[k, COUNT]
 
 
 @kernel
-def add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, weight, scale, out):
+def add_looked_sets(model, member_state, segment, j, who, slopes, t, q, v, a, bars, scale, out):
     """Add the derivatives, at fixed motion, of any response by the permanent sets.
 
     Constant:
@@ -249,18 +275,18 @@ def add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, weig
       segment: number of the stretch of time between two breakpoints.
       j: the response.
       who: of a member force the number of the member in its group.
+      slopes (PARTS,): of an expression by what it is of (`design_slopes`).
       t: time (s).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       bars (3, n): slopes of the response by q, v, a.
-      weight: its slope by the stored energy (`energy_weight`).
       scale: factor of the derivatives.
     Out:
       out (slots,): derivatives by the sets, added to.
     """
+    weight = energy_weight(model, j, slopes)
     if weight != 0.0:
         add_sets(model, segment, member_state, q, v, np.zeros(v.shape[0]), scale * weight, out)
-    else:
-        add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, scale, out)
+    add_explicit_sets(model, member_state, segment, j, who, slopes, t, q, v, a, bars, scale, out)
 
 
 @kernel

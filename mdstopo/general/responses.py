@@ -24,6 +24,7 @@ from mdstopo.general.expressions import (
     ENERGETIC,
     EXPRESSION,
     FIRST_PART,
+    FORCED,
     KNOWN,
     MARGINS,
     PARTS,
@@ -467,6 +468,10 @@ def _parts_of_expression(model, member_state, segment, j, t, q, v, a, lam, works
     first = model.response[j, FIRST_PART]
     for m in range(model.response[j, PARTS]):
         c = first + m
+        if model.response[c, KIND] == MEMBER_FORCE:
+            group = model.response[c, SUBJECT]
+            p[m] = force_of_one(model, member_state, segment, t, group, 0, q, v, a, np.bool_(True), bars[m])
+            continue
         p[m] = _value(
             model.response[c, KIND], model, member_state, segment, c, -1, t, q, v, a, lam, workspace, bars[m], rows[m]
         )
@@ -576,8 +581,16 @@ def has_energy(model, j):
 
 
 @kernel
-def energy_weight(model, member_state, segment, j, who, t, q, v, a, lam, workspace):
-    """The slope of response j by the stored energy, which depends on the design at fixed motion.
+def has_forces(model, j):
+    """Whether response j is an expression that has forces of members in it."""
+    return model.response[j, KIND] == EXPRESSION and knows(model, j, FORCED)
+
+
+@kernel
+def design_slopes(model, member_state, segment, j, who, t, q, v, a, lam, workspace):
+    """(PARTS,): slopes of expression j by what it is of, where some of that depends on the design at fixed motion.
+
+    Nothing, (0,), of other responses.
 
     Constant:
       model: the compiled scene.
@@ -590,13 +603,19 @@ def energy_weight(model, member_state, segment, j, who, t, q, v, a, lam, workspa
       lam (n_row,): multipliers of the joints.
       workspace: workspace as the balance of this state has left it.
     """
-    if not has_energy(model, j):
-        return 0.0
-    if model.response[j, KIND] == ENERGY:
-        return 1.0
+    if model.response[j, KIND] != EXPRESSION or not (has_energy(model, j) or has_forces(model, j)):
+        return np.empty(0)
     p = _expression_numbers(model, member_state, segment, j, t, q, v, a, lam, workspace)
     slopes = np.empty(model.response[j, PARTS])
     formula_value(model, j, who, p, t, slopes)
+    return slopes
+
+
+@kernel
+def energy_weight(model, j, slopes):
+    """The slope of response j by the stored energy; slopes: `design_slopes`."""
+    if model.response[j, KIND] == ENERGY:
+        return 1.0
     weight = 0.0
     for m in range(slopes.shape[0]):
         if model.response[model.response[j, FIRST_PART] + m, KIND] == ENERGY:
@@ -659,17 +678,37 @@ def members_value(model, member_state, segment, j, who, t, q, v, a, bars):
     Out:
       bars (3, n): slopes by q, v and a, added to.
     """
+    group = model.response[j, SUBJECT]
+    return force_of_one(model, member_state, segment, t, group, who, q, v, a, np.bool_(False), bars)
+
+
+@kernel
+def force_of_one(model, member_state, segment, t, group, who, q, v, a, signed, bars):
+    """The force f* of one member of a group, or its absolute value (N).
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      group, who: the group, and the number of the member in it.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+      signed: whether it is the force, tension positive.
+    Out:
+      bars (3, n): slopes by q, v and a, added to.
+    """
     slopes = np.empty((3, pair_freedoms(model)))
     own = np.empty((2, pair_freedoms(model)))
-    f, pair = member_force(model, member_state, segment, t, model.response[j, SUBJECT], who, q, v, a, slopes, own)
-    sign = 1.0 if f >= 0.0 else -1.0
+    f, pair = member_force(model, member_state, segment, t, group, who, q, v, a, slopes, own)
+    sign = 1.0 if signed or f >= 0.0 else -1.0
     inertial = False
     for i in range(3):
         for c in range(pair_freedoms(model)):
             bars[i, place_in_pair(model, pair, c)] += sign * slopes[i, c]
             inertial = inertial or (i == 2 and slopes[i, c] != 0.0)
     if inertial:
-        _inerter_slopes(model, member_state, segment, who, j, sign, q, v, a, bars)
+        _inerter_slopes(model, member_state, segment, who, group, sign, q, v, a, bars)
     return sign * f
 
 
@@ -971,7 +1010,7 @@ def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, 
 
 
 @kernel
-def _inerter_slopes(model, member_state, segment, who, j, sign, q, v, a, bars):
+def _inerter_slopes(model, member_state, segment, who, group, sign, q, v, a, bars):
     """Add the slopes by q and v of an inerter's force, by sixth-order differences of its formula: rarely needed.
 
     Constant:
@@ -979,20 +1018,15 @@ def _inerter_slopes(model, member_state, segment, who, j, sign, q, v, a, bars):
     In:
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
-      who: number of the member in the group.
-      j: the response, which says which group.
-      sign: sign of f*, whose absolute value is differentiated.
+      who, group: number of the member in its group, and the group.
+      sign: what f* is multiplied by before it is differentiated.
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       bars (3, n): slopes by q and v are added to its first two rows.
     """
     own = np.empty(pair_freedoms(model))
     for k in range(model.block.shape[0]):
-        if (
-            model.block[k, GROUP] != model.response[j, SUBJECT]
-            or model.block[k, CODE] != INERTER
-            or model.active[segment, k] == 0
-        ):
+        if model.block[k, GROUP] != group or model.block[k, CODE] != INERTER or model.active[segment, k] == 0:
             continue
         if who < model.block[k, OFFSET] or who >= model.block[k, OFFSET] + model.block[k, COUNT]:
             continue

@@ -81,7 +81,7 @@ def _blocks(case: Case, block: IndexArray) -> dict[tuple[str, int], list[int]]:
 
 
 def as_computed(case: Case) -> Case:
-    """The case as kernels have it: laws by formula that are linear springs are springs."""
+    """The case as kernels have it: laws by formula that are springs are the built-in ones."""
     if not any(isinstance(law, OfFormulas) for group in case.members for law in group.laws):
         return case
     from mdstopo.general.formula_springs import with_springs

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from mdstopo.case.errors import Mistake
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, Objective, Response, ResponseRow, VolumeRow
-from mdstopo.case.words import number_text
+from mdstopo.case.words import number_text, shown
 from mdstopo.scene.family import beyond_collocation, beyond_springs
 from mdstopo.scene.moving_volumes import moving_volumes
 from mdstopo.settings.optimizers import OPTIMIZERS
@@ -65,6 +65,16 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
             if part.since == "settled":
                 key = f"{path}.response.expression.of.{name}.{part.kind}.since"
                 yield key, "within an expression displacements count from where the case has them: stated"
+            if part.group is not None:
+                yield from _several_members(case, part.group, f"{path}.response.expression.of.{name}.{part.kind}.group")
+
+
+def _several_members(case: Case, name: str, path: str) -> Iterator[tuple[str, str]]:
+    """A group in an expression that has not one member: the largest force of several is not followed there."""
+    group = next(group for group in case.members if group.name == name)
+    count = len(group.length) if group.candidates is None else group.candidates.count
+    if count != 1:
+        yield path, f"found {shown(name)} with {count} members; allowed in an expression are groups of one member"
 
 
 def rows_of_responses(case: Case) -> Iterator[tuple[str, Objective | ResponseRow]]:

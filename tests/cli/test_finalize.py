@@ -16,7 +16,7 @@ from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.yaml_text import text_of
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
-from mdstopo.finalize.document import content_of, final_content
+from mdstopo.finalize.document import _looking, content_of, final_content
 from mdstopo.finalize.equilibria import _Distance
 from mdstopo.finalize.finalize_design import finalize, ready
 from mdstopo.finalize.keep import chosen, places, restricted
@@ -509,3 +509,14 @@ def test_distances_of_places_of_rest_are_known_in_space() -> None:
     far = _Distance(read_case(text), SPATIAL, still, moved)
     assert (far.distance, far.body) == (pytest.approx(0.05, rel=1e-14), "a")
     assert (far.angle, far.turned) == (pytest.approx(0.3, rel=1e-12), "b")
+
+
+def test_an_expression_looks_at_the_group_that_its_member_has_become() -> None:
+    def looking(group: str) -> dict[str, object]:
+        of = {"f": {"member_force": {"group": group}}, "e": "energy"}
+        return {"response": {"expression": {"formula": "f*e", "of": of}}, "over_time": "mean"}
+
+    groups = {"tie": ["tie_0"], "net": []}
+    assert _looking(looking("tie"), groups) == [looking("tie_0")]
+    assert _looking(looking("net"), groups) == []
+    assert _looking(looking("other"), groups) == [looking("other")]

@@ -65,6 +65,10 @@ class Kernels:
         both = table.law_margin_slopes(self.code, self.p, x, xd, mode, t, self.curves, REST)
         return [*both, table.law_margin_by_time(self.code, self.p, x, xd, mode, t, self.curves, REST)]
 
+    def is_idle(self, mode: int) -> bool:
+        """Whether nothing acts."""
+        return bool(table.law_is_idle(self.code, mode))
+
     def next(self, x: float, xd: float, mode: int, t: float = 0.0) -> int:
         """The mode behind the end of a mode."""
         return int(table.law_next(self.code, self.p, x, xd, 0.0, mode, t, self.curves, REST))
@@ -119,6 +123,33 @@ def test_built_in_laws_written_as_formulas_have_the_same_values_and_slopes(kind:
                 np.testing.assert_allclose(other.by(place, x, xd, modes[1], t), by, rtol=1e-12, atol=1e-12)
             rest = one.by(table.FREE_LENGTH, x, xd, modes[0], t)
             np.testing.assert_allclose(other.by(table.FREE_LENGTH, x, xd, modes[1], t), rest, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["gap", "gap compressed", "gap clipped", "gap of energy", "actuator"])
+def test_nothing_acts_where_nothing_of_the_built_in_laws_does(kind: str) -> None:
+    one, other = (Kernels(law) for law in BUILT_IN[kind])
+    found = {(one.is_idle(one.start(*state)), other.is_idle(other.start(*state))) for state in STATES}
+    assert found == ({(False, False)} if kind == "actuator" else {(True, True), (False, False)})
+
+
+def test_a_power_of_nothing_acts_where_its_exponent_is_not_above_zero() -> None:
+    law = "if(x < 0, -k*(-x)^n, 0)", "k*max(-x, 0)^(n + 1)/(n + 1)"
+    for n, idle in ((1.5, True), (-0.5, True), (-1.5, False)):
+        kernels = Kernels(law_of(*law, k=2.0, n=n))
+        assert kernels.is_idle(kernels.start(0.1, 0.0)) == idle
+        assert (kernels.at(0.1, 0.0, kernels.start(0.1, 0.0)) == 0.0).all() == idle
+
+
+def test_a_law_that_was_idle_acts_behind_its_switch_and_is_idle_again() -> None:
+    kernels = Kernels(BUILT_IN["gap clipped"][1])
+    open_one = kernels.start(0.0, 1.0)
+    assert kernels.is_idle(open_one)
+    closed = kernels.next(0.02 + 1e-16, 1.0, open_one)
+    assert not kernels.is_idle(closed)
+    assert kernels.at(0.03, 1.0, closed)[0] == pytest.approx(300.0 * 0.01 + 7.0)
+    clipped = kernels.next(0.0201, -3.0, closed)
+    assert not kernels.is_idle(clipped)  # it stores something
+    assert kernels.is_idle(kernels.next(0.02 - 1e-16, -3.0, clipped))
 
 
 @pytest.mark.parametrize("kind", ["gap", "gap compressed", "gap clipped", "gap of energy", "actuator"])

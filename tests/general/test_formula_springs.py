@@ -1,4 +1,4 @@
-"""Laws by formula that are linear springs are recognised, and no others."""
+"""Laws by formula that are springs, linear or cubic, are recognised, and no others."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from mdstopo.case.laws.cubic import CubicLaw
 from mdstopo.case.laws.spring import SpringLaw
 from mdstopo.case.reader import read_case
 from mdstopo.formula.parser import parse
@@ -34,6 +35,9 @@ OTHERS = [
     ("k*c*x", "k*c*x^2/2", None),
     ("2*k*x", "k*x^2", None),
     ("k*x + t", "k*x^2/2", None),
+    ("k*x + c*x^3", "k*x^2/2 + c*x^4/2", None),
+    ("k*x + k*x^3", "k*x^2/2 + k*x^4/4", None),
+    ("k*x + c*x^3 + p", "k*x^2/2 + c*x^4/4 + p*x", None),
     ("k*l", "k*l^2/2", None),
     ("k*x + c*xd^2", "k*x^2/2", None),
     ("k*abs(x)", "k*x*abs(x)/2", None),
@@ -53,6 +57,7 @@ def test_a_spring_is_recognised_however_it_is_written(
     found = spring_of(law)
     assert found is not None
     spring, taken = found
+    assert isinstance(spring, SpringLaw)
     assert (spring.stiffness, spring.damping, spring.preload) == numbers
     assert taken == words
     # both say the same, computed apart
@@ -64,6 +69,25 @@ def test_a_spring_is_recognised_however_it_is_written(
             assert evaluate(energy, names) == pytest.approx(0.5 * spring.stiffness * x**2, rel=1e-14)
 
 
+CUBICS = [
+    ("k*x + c*x^3", "k*x^2/2 + c*x^4/4", (225.0, 2.0), {"k": "stiffness", "c": "cubic"}),
+    (None, "x^2*(k/2 + c*x^2/4)", (225.0, 2.0), {"k": "stiffness", "c": "cubic"}),
+    ("3*x*x*x", "0.75*x^4", (0.0, 3.0), {}),
+]
+
+
+@pytest.mark.parametrize(("force", "energy", "numbers", "words"), CUBICS)
+def test_a_cubic_spring_is_recognised(
+    force: str | None, energy: str, numbers: tuple[float, float], words: dict[str, str]
+) -> None:
+    found = spring_of(law_of(force, energy, **NUMBERS))
+    assert found is not None
+    spring, taken = found
+    assert isinstance(spring, CubicLaw)
+    assert (spring.stiffness, spring.cubic) == numbers
+    assert taken == words
+
+
 @pytest.mark.parametrize(("force", "energy", "damping"), OTHERS)
 def test_what_is_no_spring_is_none(force: str, energy: str | None, damping: str | None) -> None:
     assert spring_of(law_of(force, energy, damping, **NUMBERS)) is None
@@ -72,7 +96,7 @@ def test_what_is_no_spring_is_none(force: str, energy: str | None, damping: str 
 def test_polynomials_are_exact_and_anything_else_is_none() -> None:
     form = polynomial(parse("(x + 2*k)^2 - x*x - 4*x*k").root)
     assert form == {("k", "k"): Fraction(4)}
-    for text in ("x/k", "x^k", "x^3", "sqrt(x)", "if(x > 0, x, k)", "x/0"):
+    for text in ("x/k", "x^k", "x^5", "sqrt(x)", "if(x > 0, x, k)", "x/0"):
         assert polynomial(parse(text).root) is None, text
 
 

@@ -220,6 +220,71 @@ def test_a_motion_by_a_formula_is_that_of_the_cubic_which_it_repeats_with_its_gr
         assert other.gradients[name] == pytest.approx(gradient, abs=1e-8 * max(np.abs(gradient).max(), 1e-12))
 
 
+#: a position, and what its rate and its acceleration are as formulas
+RATES = {
+    "wave": ("0.1 + a*sin(w*t)^2", "a*w*sin(2*w*t)", "2*a*w^2*cos(2*w*t)", "{a: 0.02, w: 70}"),
+    "kink": ("0.1 + a*max(t - w, 0)^2", "2*a*max(t - w, 0)", "2*a*step(t - w)", "{a: 0.3, w: 0.35}"),
+    "slow": ("0.1 + a*(exp(-t) - 1 + w*t)", "a*(w - exp(-t))", "a*exp(-t)", "{a: 0.3, w: 1}"),
+    "beginning with a root": ("0.1 + a*t^2.5*w", "2.5*a*t^1.5*w", "3.75*a*t^0.5*w", "{a: 0.3, w: 1}"),
+}
+
+
+@pytest.mark.parametrize("kind", RATES)
+def test_a_motion_by_its_velocity_or_its_acceleration_is_the_integral(kind: str) -> None:
+    position, velocity, acceleration, parameters = RATES[kind]
+    text = DRIVEN.replace(
+        "objectives:",
+        """objectives:
+  X: {response: {displacement: {body: cart, component: x}}, over_time: final}
+  N: {response: {velocity: {body: load}}, over_time: mean}""",
+    ).replace("weights: {", "weights: {X: 1, N: 1, ")
+    found = [
+        mdstopo.evaluate(
+            read_case(text.replace("position: POSITION", f"{key}: {{formula: '{formula}', parameters: {parameters}}}"))
+        )
+        for key, formula in (("position", position), ("velocity", velocity), ("acceleration", acceleration))
+    ]
+    for other in found[1:]:
+        for name, gradient in found[0].gradients.items():
+            assert other.objectives[name] == pytest.approx(found[0].objectives[name], rel=1e-9, abs=1e-12), name
+            assert np.abs(other.gradients[name] - gradient).max() <= 1e-7 * np.abs(gradient).max() + 1e-13, name
+    values = {word: float(value) for word, value in (each.split(":") for each in parameters.strip("{}").split(","))}
+    values = {word.strip(): value for word, value in values.items()}
+    moved = TimeFormula(position, tuple(values.items())).at(1.0) - 0.1
+    for each in found:
+        assert each.objectives["X"] == pytest.approx(moved, rel=1e-12)
+
+
+def test_in_space_a_turn_by_its_rate_is_the_integral() -> None:
+    text = """
+    format: 1
+    dimension: 3
+    time: {end: 1}
+    bodies:
+      drum: {mass: 2, inertia: [1, 2, 3], position: [0, 0, 0]}
+      load: {mass: 3, inertia: [1, 1, 1], position: [1, 0, 0]}
+    points:
+      rim: {body: drum, grid: {list: [[0.3, 0, 0], [0, 0.3, 0.1], [-0.2, 0.1, 0]]}}
+      eye: {body: load, grid: {list: [[0.8, 0, 0.1], [1, 0.2, 0]]}}
+    members: {ropes: {from: rim, to: eye, law: {type: spring, stiffness: 300, damping: 3}}}
+    motions: [{body: drum, x: {velocity: 0}, y: {velocity: 0}, z: {velocity: 'sin(3*t)'}, rotation: TURN}]
+    design: {initial: 0.5}
+    solver: {tolerance: 1e-10}
+    objectives: {G: {response: {velocity: {body: load}}, over_time: final}}
+    """
+    about = "{axis: [1, 2, 3], ANGLE}"
+    turns = [
+        "position: 'a*t^3'", "velocity: '3*a*t^2'", "acceleration: '6*a*t'",
+    ]  # fmt: skip
+    angles = "{roll: {velocity: '2*t'}, pitch: {acceleration: 'sin(t)'}, yaw: {position: 't^2/3'}}"
+    same = "{roll: {position: 't^2'}, pitch: {position: 't - sin(t)'}, yaw: {position: 't^2/3'}}"
+    stated = [about.replace("ANGLE", each.replace("a*", "0.7*")) for each in turns] + [angles, same]
+    found = [mdstopo.evaluate(read_case(text.replace("TURN", each))) for each in stated]
+    for one, other in ((0, 1), (0, 2), (4, 3)):
+        assert found[other].objectives["G"] == pytest.approx(found[one].objectives["G"], rel=1e-10)
+        assert found[other].gradients["G"] == pytest.approx(found[one].gradients["G"], rel=1e-8)
+
+
 #: what is stated -> the key and what the message has
 MALFORMED = {
     "force: ['10*sin(tt)', 0]": ("loads[0].force[0]", "did you mean 't'? names are t (column 8"),
@@ -250,7 +315,9 @@ def test_what_formulas_of_time_cannot_do_is_refused() -> None:
         mdstopo.evaluate(read_case(DRIVEN.replace("POSITION", "'0.1 + step(t - 0.5)'")))
     with pytest.raises(CaseError, match="they must agree"):
         read_case(DRIVEN.replace("POSITION", "'0.3 + t^2'"))
-    with pytest.raises(CaseError, match=r"motions\[0\].y.velocity: found the text"):
-        read_case(
-            DRIVEN.replace("POSITION", "'0.1 + t^2'").replace("velocity: 0}, angle", "velocity: 'sin(t)'}, angle")
-        )
+    with pytest.raises(CaseError, match=r"motions\[0\].x.velocity: the expression has no value at the start, 0 s"):
+        read_case(DRIVEN.replace("position: POSITION", "velocity: '1/t'"))
+    with pytest.raises(CaseError, match=r"the prescribed velocity of cart jumps at t = 0\.5 s, but it is jointed"):
+        mdstopo.evaluate(read_case(DRIVEN.replace("position: POSITION", "velocity: 'step(t - 0.5)'")))
+    with pytest.raises(CaseError, match=r"the expression t\*sin\(1e6\*t\) changes too fast at t = "):
+        mdstopo.evaluate(read_case(DRIVEN.replace("position: POSITION", "velocity: 't*sin(1e6*t)'")))

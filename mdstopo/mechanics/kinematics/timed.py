@@ -1,4 +1,11 @@
-"""Quantities that are formulas of time: loads and driven coordinates. What they do to bodies is each dimension's."""
+"""Quantities that are formulas of time: loads and driven coordinates. What they do to bodies is each dimension's.
+
+A formula may give a driven coordinate, its rate or its acceleration. Of the latter two the coordinate is an integral
+from the start of the segment, by Gauss' quadrature; segments are so short that it is right to rounding
+(`general.driven_integrals`).
+"""
+
+import numpy as np
 
 from mdstopo.case.time_formula import MOST_PARAMETERS
 from mdstopo.compiler.formulas import call_formula
@@ -6,8 +13,13 @@ from mdstopo.compiler.jit import part
 from mdstopo.formula.time_formulas import VALUE
 
 #: columns of `GeneralModel.timed_par` and `driven_par`: parameters first, then where the formula is (0: there is none),
-#: what it is multiplied by, and what is added
-ADDRESS, SCALE, OFFSET, WIDTH = range(MOST_PARAMETERS, MOST_PARAMETERS + 4)
+#: what it is multiplied by, what is added, and of driven coordinates which derivative of it the formula gives
+ADDRESS, SCALE, OFFSET, DERIVED, WIDTH = range(MOST_PARAMETERS, MOST_PARAMETERS + 5)
+#: the values of DERIVED
+COORDINATE, RATE, ACCELERATION = range(3)
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+#: points and weights of a quadrature over (0, 1)
+NODES, WEIGHTS = tuple((0.5 + 0.5 * _POINTS).tolist()), tuple((0.5 * _WEIGHTS).tolist())
 #: columns of `GeneralModel.timed_load`: the body, what acts on it, and as `load_follows`
 BODY, KIND, TURNS = range(3)
 #: what acts: a force at a point, a moment
@@ -37,6 +49,8 @@ def timed_load_size(model, segment, k, t):
 def driven_coordinate(model, segment, t, i):
     """Driven coordinate i at a time of a segment, its rate and its acceleration."""
     if model.driven_par[i, ADDRESS] != 0.0:
+        if model.driven_par[i, DERIVED] != COORDINATE:
+            return _integrated(model, segment, t, i)
         return timed_numbers(model.driven_par[i], model.driven_mode[segment, i], t)
     c = model.drive[segment, i]
     tau = t - model.times[segment]
@@ -45,6 +59,26 @@ def driven_coordinate(model, segment, t, i):
         c[1] + tau * (2.0 * c[2] + 3.0 * tau * c[3]),
         2.0 * c[2] + 6.0 * tau * c[3],
     )
+
+
+@part
+def _integrated(model, segment, t, i):
+    """`driven_coordinate` where the formula gives its rate or its acceleration."""
+    p = model.driven_par[i]
+    mode = model.driven_mode[segment, i]
+    c = model.drive[segment, i]
+    start = model.times[segment]
+    tau = t - start
+    once = 0.0
+    twice = 0.0
+    for k in range(len(NODES)):
+        f, _, _ = timed_numbers(p, mode, start + NODES[k] * tau)
+        once += WEIGHTS[k] * f
+        twice += WEIGHTS[k] * (1.0 - NODES[k]) * f
+    value, rate, _ = timed_numbers(p, mode, t)
+    if p[DERIVED] == RATE:
+        return c[0] + tau * once, value, rate
+    return c[0] + tau * (c[1] + tau * twice), c[1] + tau * once, value
 
 
 @part

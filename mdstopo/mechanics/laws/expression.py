@@ -1,10 +1,12 @@
 """`expression`: force and energy are formulas. Parameters: those of the formulas; last, where its data begin.
 
 The data are where the machine code of the formulas is (`compiler.formulas`), the number of parameters, that of
-switches, whether any of these depends on time, and which group has the force's slope by time, 0 where that is none. Its
-groups of numbers are those of `formula.law_formulas`.
+switches, whether any of these depends on time, which group has the force's slope by time, 0 where that is none, bits of
+the switches at which slopes begin with a root (`formula.sharp`), and on which sides of switches nothing acts
+(`formula.idle`). Its groups of numbers are those of `formula.law_formulas`.
 
-The mode's bits say on which side each switch is; as long as they stay the formulas are smooth (`formula.modes`).
+The mode's bits say on which side each switch is; as long as they stay the formulas are smooth (`formula.modes`). A bit
+above them says that nothing acts.
 """
 
 import math
@@ -14,11 +16,15 @@ import numpy as np
 from mdstopo.case.laws.expression import OfFormulas
 from mdstopo.compiler.formulas import address_of, call_formula
 from mdstopo.compiler.jit import inline
+from mdstopo.formula.idle import as_numbers
 from mdstopo.formula.law_formulas import FIRST, FORCE, LOWEST
+from mdstopo.formula.modes import MOST_SWITCHES
 from mdstopo.mechanics.laws.kernels import LawKernels, Modes
 
 #: place in the row of where the data begin
 AT = 7
+#: the bit of a mode in which nothing acts
+IDLE = 2**MOST_SWITCHES
 #: margins that are smaller than this, times the size of things, are zero where something begins
 NEAR = 1e-13
 
@@ -30,7 +36,8 @@ def expression_data(record: OfFormulas, at: int) -> tuple[list[float], list[floa
     row = [*values, *[0.0] * (AT - len(values)), float(at)]
     timed = float(made.has_timed_switches)
     by_time = float(made.by_time if made.is_timed else 0)
-    return row, [float(address_of(made.groups)), float(made.parameters), float(made.switches), timed, by_time]
+    head = [float(address_of(made.groups)), float(made.parameters), float(made.switches), timed, by_time]
+    return row, [*head, float(made.sharp), *as_numbers(made.idle)]
 
 
 def expression_is_smooth(record: OfFormulas) -> bool:
@@ -131,6 +138,24 @@ def expression_switches(p, curves):
 
 
 @inline
+def expression_idle(mode):
+    """Whether the switches are on sides on which force and energy are 0."""
+    return mode >= IDLE
+
+
+@inline
+def _marked(p, mode, curves):
+    """A mode of bits of switches, with IDLE where force and energy are 0."""
+    at = int(p[AT]) + 6
+    for i in range(int(curves[at])):
+        which = int(curves[at + 4 * i + 1])
+        place = int(curves[at + 4 * i + 3])
+        if mode & which == int(curves[at + 4 * i + 2]) and (place < 0 or p[place] > curves[at + 4 * i + 4]):
+            return mode | IDLE
+    return mode
+
+
+@inline
 def _seen(p, x, xd, mode, t, curves, l0, switch):
     """The margin of a switch, signed so that it is not negative in the mode, its slopes by x, xd and t, and 1 where it
     is looked at.
@@ -172,6 +197,24 @@ def _lowest(p, x, xd, mode, t, curves, l0):
             slopes = (by_x, by_rate, by_time)
             who = switch
     return best, slopes[0], slopes[1], slopes[2], who
+
+
+@inline
+def expression_sharp(p, x, xd, mode, t, curves, l0):
+    """Whether slopes of the force begin or end with a root at the switch whose margin is the smallest.
+
+    p (PARAMETERS,): its parameters, and where its data begin.
+    x, xd: elongation (m) and its rate (m/s).
+    mode: the bits of the switches.
+    t: time (s).
+    curves: data of all laws.
+    l0: free length (m).
+    """
+    sharp = int(curves[int(p[AT]) + 5])
+    if sharp == 0 or mode >= IDLE:
+        return False
+    _, _, _, _, who = _lowest(p, x, xd, mode, t, curves, l0)
+    return who >= 0 and (sharp >> who) & 1 == 1
 
 
 @inline
@@ -336,6 +379,7 @@ def expression_next(p, x, xd, xdd, mode, t, curves, l0):
     _, _, _, _, who = _lowest(p, x, xd, mode, t, curves, l0)
     if who < 0:
         return mode
+    mode &= IDLE - 1
     new = mode ^ (1 << who)
     near = NEAR * max(1.0, abs(x))
     for switch in range(int(curves[int(p[AT]) + 2])):
@@ -347,7 +391,7 @@ def expression_next(p, x, xd, xdd, mode, t, curves, l0):
             side = _side(p, x, xd, xdd, new, t, curves, l0, switch)
             if (new >> switch) & 1 != side:
                 new ^= 1 << switch
-    return new
+    return _marked(p, new, curves)
 
 
 @inline
@@ -365,7 +409,7 @@ def expression_start(p, x, xd, xdd, t, curves, l0):
     for switch in range(int(curves[int(p[AT]) + 2])):
         if _side(p, x, xd, xdd, mode, t, curves, l0, switch) == 1:
             mode |= 1 << switch
-    return mode
+    return _marked(p, mode, curves)
 
 
 @inline
@@ -416,7 +460,9 @@ KERNELS = LawKernels(
         next_mode=expression_next,
         first_mode=expression_start,
         switches=expression_switches,
+        idle=expression_idle,
         grazes=expression_grazes,
+        sharp=expression_sharp,
     ),
     data=expression_data,
 )

@@ -40,6 +40,8 @@ class Modes:
     idle (mode): whether nothing acts and nothing is stored in a mode; None where that is true of none.
     grazes (p, x, mode, t, curves, l0): what a margin that is only just used up (or not) does to derivatives: nothing 0,
     the force 1, the motion 2; None where it is always 0.
+    sharp (p, x, xd, mode, t, curves, l0): whether slopes of the force begin with a root at the end of a mode that is
+    nearest, so that steps beside it have to be short; None where that is true of none.
     pieces: whether modes are pieces of one function that is smooth enough for motion and derivatives, so that only the
     accuracy of steps gains where they end at the end of a mode.
     """
@@ -56,6 +58,7 @@ class Modes:
     switches: Function | None = None
     idle: Function | None = None
     grazes: Function | None = None
+    sharp: Function | None = None
     pieces: bool = False
 
 

@@ -370,6 +370,21 @@ def law_grazes(code, p, x, mode, t, curves, l0):
     return 0
 
 
+@chosen(LISTED, lambda each: each.modes and each.modes.sharp, inline)
+def law_is_sharp(code, p, x, xd, mode, t, curves, l0):
+    """Whether slopes of the force begin with a root at the end of the mode that is nearest.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
+    """
+    return False
+
+
 # Permanent sets
 
 

@@ -1,0 +1,146 @@
+"""Prescribed motions whose rate or acceleration is a formula of time: what they have come to at the ends of segments.
+
+Kernels integrate the formula from the start of a segment by a quadrature of 16 points (`kinematics.timed`). So segments
+end where it needs them to, beside its kinks and jumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from mdstopo.case.arrays import TimeFormula
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case, LoadCase
+from mdstopo.case.prescribed import KINDS
+from mdstopo.compiler.formulas import FormulaCalls
+from mdstopo.formula.time_formulas import VALUE
+from mdstopo.general.timed_loads import mistake_of, modes, row_of_formula
+from mdstopo.mechanics.kinematics.timed import (
+    ACCELERATION,
+    ADDRESS,
+    COORDINATE,
+    DERIVED,
+    NODES,
+    OFFSET,
+    RATE,
+    SCALE,
+    WEIGHTS,
+)
+from mdstopo.scene.model import FloatArray, IndexArray
+
+#: which derivative of a coordinate is prescribed
+DERIVATIVES = dict(zip(KINDS, (ACCELERATION, RATE, COORDINATE), strict=True))
+#: by how much an integral over a segment may differ from that of both halves, relative to the largest so far
+CONVERGED = 4e-15
+#: cuts for one formula at most
+MOST_CUTS = 1000
+
+
+class Integrals(NamedTuple):
+    """Of a formula f over a stretch of time of the length h: that of f, and that of f times the time until its end."""
+
+    once: float
+    twice: float
+
+    def and_then(self, other: Integrals, length: float) -> Integrals:
+        """Both stretches one after the other; length: of the other one (s)."""
+        return Integrals(self.once + other.once, self.twice + length * self.once + other.twice)
+
+
+class Prescribing:
+    """A formula with the bits of its switches, called from Python. row (WIDTH,): as of `driven_par`."""
+
+    def __init__(self, row: FloatArray) -> None:
+        self.row = row
+        self._calls = FormulaCalls(row[ADDRESS], row)
+
+    def at(self, time: float, mode: int) -> tuple[float, float]:
+        """Value and rate."""
+        value, rate, *_ = self._calls.numbers(0.0, 0.0, time, 0.0, mode, VALUE)
+        return self.row[SCALE] * value + self.row[OFFSET], self.row[SCALE] * rate
+
+    def over(self, start: float, length: float, mode: int) -> Integrals:
+        """Over a stretch of time that begins at `start` and is so long."""
+        once = twice = 0.0
+        for node, weight in zip(NODES, WEIGHTS, strict=True):
+            value, _ = self.at(start + node * length, mode)
+            once += weight * value
+            twice += weight * (1.0 - node) * value
+        return Integrals(length * once, length * length * twice)
+
+
+def row_of_motion(formula: TimeFormula, kind: str) -> FloatArray:
+    """(WIDTH,): a formula that prescribes a coordinate, its velocity or its acceleration."""
+    row = row_of_formula(formula)
+    row[DERIVED] = float(DERIVATIVES[kind])
+    return row
+
+
+def integrated_ends(row: FloatArray, sides: IndexArray, times: FloatArray, position: float, rate: float) -> FloatArray:
+    """(n_seg, 2, 2): the coordinate and its rate at both ends of segments, on their side.
+
+    row (WIDTH,): of a formula of its rate or its acceleration.
+    sides (n_seg,): bits of the formula's switches.
+    times (n_seg + 1,): ends of the segments (s).
+    position, rate: at the start, the rate of an acceleration.
+    """
+    formula = Prescribing(row)
+    out = np.empty((len(times) - 1, 2, 2))
+    for k, mode in enumerate(sides.tolist()):
+        start, end = float(times[k]), float(times[k + 1])
+        found = formula.over(start, end - start, mode)
+        if row[DERIVED] == RATE:
+            out[k] = (position, formula.at(start, mode)[0]), (position + found.once, formula.at(end, mode)[0])
+        else:
+            out[k] = (position, rate), (position + (end - start) * rate + found.twice, rate + found.once)
+        position, rate = out[k, 1]
+    return out
+
+
+def integration_times(case: Case, load_case: LoadCase, kinks: list[float]) -> list[float]:
+    """Times at which segments have to end, beside kinks, for integrals of formulas to be right to rounding.
+
+    Raises CaseError where a formula changes too fast.
+    """
+    found: list[float] = []
+    inside = [time for time in kinks if load_case.start < time < load_case.end]
+    ends = np.array([load_case.start, *sorted(inside), load_case.end])
+    for formula in _of_motions(load_case):
+        own = Prescribing(row_of_formula(formula))
+        largest = Integrals(0.0, 0.0)
+        cuts: list[float] = []
+        for start, end, mode in zip(ends[:-1].tolist(), ends[1:].tolist(), modes(formula, ends).tolist(), strict=True):
+            whole = own.over(start, end - start, mode)
+            largest = Integrals(max(largest.once, abs(whole.once)), max(largest.twice, abs(whole.twice)))
+            open_pieces = [(start, end, whole)]
+            while open_pieces:
+                low, high, whole = open_pieces.pop()
+                middle = 0.5 * (low + high)
+                first, last = own.over(low, middle - low, mode), own.over(middle, high - middle, mode)
+                if _are_alike(whole, first.and_then(last, high - middle), largest) or not low < middle < high:
+                    continue
+                if len(cuts) == MOST_CUTS:
+                    message = f"the expression {formula.text} changes too fast at t = {low:.6g} s to be integrated"
+                    raise CaseError([mistake_of(case, load_case, "motions", message)], str(case.path or case.name))
+                cuts.append(middle)
+                open_pieces += [(middle, high, last), (low, middle, first)]
+        found += cuts
+    return found
+
+
+def _are_alike(whole: Integrals, halves: Integrals, largest: Integrals) -> bool:
+    """Whether integrals over a stretch of time are those over its halves; largest: what rounding is relative to."""
+    pairs = zip(whole, halves, largest, strict=True)
+    return all(abs(a - b) <= CONVERGED * max(most, abs(b)) for a, b, most in pairs)
+
+
+def _of_motions(load_case: LoadCase) -> Iterator[TimeFormula]:
+    """Formulas of velocities and accelerations."""
+    for motion in load_case.motions:
+        parts = [motion.x, motion.y, motion.z, motion.angle, *(motion.rotation.angles if motion.rotation else ())]
+        for part in parts:
+            if part is not None and part.kind != "position" and isinstance(part.signal, TimeFormula):
+                yield part.signal
