@@ -102,7 +102,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     ),
     "sensitivity/test_agreement.py": ("generalized_alpha",),
     "sensitivity/test_candidate_prices.py": ("are_built[runge_kutta", "are_built[generalized_alpha"),
-    "session/test_priced_candidates.py": ("bit[20", "bit[45"),
+    "session/test_priced_candidates.py": ("bit[20", "bit[45", "members_with_slack"),
     "session/test_starts_in_quotas.py": ("been[30", "been[45", "beginning[1-2", "beginning[1-9"),
     "space/test_contacts_in_space.py": ("implicit", "collision", "gradients_through_contacts"),
     "space/test_driven_bodies.py": ("gradients_with_driven",),

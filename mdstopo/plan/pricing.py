@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mdstopo.engine import Evaluator
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 #: candidates that enter at once, at most: those that gain, and neighbours that may once these have entered
 MOST = 500
@@ -39,7 +40,7 @@ class Prices:
     seen: candidates. best: the largest gain of one, together: how much all of them may gain, relative to the
     objective, to first order. pairs: those that are to enter, by group; gains: of these, the largest first. built (N,):
     dL/dalpha of the members that are built, with the multipliers of rows and limits. residual: of the optimality
-    conditions of these members. rows (R + C,), linear (m,): these multipliers.
+    conditions of these members. rows (R + C,), linear (m,): these multipliers; gradients (R + C, N): of the rows.
     """
 
     seen: int
@@ -51,6 +52,7 @@ class Prices:
     residual: float
     rows: Floats
     linear: Floats
+    gradients: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +84,8 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
     sample = problem.sample_of(evaluation)
     residual, rows, linear = _multipliers(problem, sample, x)
     asked = problem.asked_of_members(evaluation, rows)
-    built = _slopes(problem, sample, rows, linear)
+    gradients = gradients_of(sample)
+    built = rows @ gradients + linear @ problem.linear.A
     scale = abs(sample.objective) or 1.0
     seen, best, together = 0, 0.0, 0.0
     pairs: dict[str, Pairs] = {}
@@ -94,7 +97,7 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
         material = _material(case, group)
         together += (found.together if material is None else min(found.together, found.ratio * material)) / scale
         pairs[group.name], gains[group.name] = (found.i, found.j), found.gain / scale
-    return Prices(seen, best, together, pairs, gains, built, residual, rows, linear)
+    return Prices(seen, best, together, pairs, gains, built, residual, rows, linear, gradients)
 
 
 def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
@@ -115,9 +118,9 @@ def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
     alpha = in_case(larger, packed(case, x))
     other = cast("DesignProblem", make_engine(larger).problem(problem.scalarisation))
     sample = other.evaluate(alpha)
-    if sample.status is not Status.OK or len(sample.rows) + len(sample.constraint_rows) != len(prices.rows):
+    if sample.status is not Status.OK:
         return prices
-    slopes = _slopes(other, sample, prices.rows, prices.linear)
+    slopes = slopes_with(prices, gradients_of(sample), _places(case, larger)) + prices.linear @ other.linear.A
     scale = abs(sample.objective) or 1.0
     best = 0.0
     for group in larger.priced_groups:
@@ -131,12 +134,38 @@ def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
     return replace(prices, best=best)
 
 
-def _slopes(problem: "DesignProblem", sample: Sample, rows: Floats, linear: Floats) -> Floats:
-    """dL/dalpha (N,) with multipliers of rows (R + C,) and of linear rows (m,)."""
-    found: Floats = rows[: len(sample.rows)] @ sample.gradients + linear @ problem.linear.A
-    if len(rows) > len(sample.rows):
-        found = found + rows[len(sample.rows) :] @ sample.constraint_gradients
-    return found
+def gradients_of(sample: Sample) -> Floats:
+    """(R + C, N) of the rows of U, then of those of constraints on responses."""
+    limits = sample.constraint_gradients
+    return np.concatenate([sample.gradients, limits]) if len(limits) else sample.gradients
+
+
+def slopes_with(prices: Prices, gradients: Floats, places: Ints) -> Floats:
+    """The weighted sum (M,) of rows of a case with more members, (K, M), with the multipliers of prices.
+
+    Each row that carries one is taken for the row with the most similar gradient by the members that both have; places
+    (N,): of these among the M. Rows that are as high as each other may change places.
+    """
+    total = np.zeros(gradients.shape[1])
+    for weight, row in zip(prices.rows.tolist(), prices.gradients, strict=True):
+        if weight != 0.0:
+            apart = np.abs(gradients[:, places] - row).sum(axis=1)
+            total += weight * gradients[int(np.argmin(apart))]
+    return total
+
+
+def _places(case: Case, larger: Case) -> Ints:
+    """(N,): where the members of a case are among those of one that has them and more."""
+    pieces = []
+    for group in case.design_groups:
+        part, width = larger.group_slices[group.name], len(group.to_local)
+        own = np.arange(len(group))
+        if group.candidates is not None:
+            every = next(each for each in larger.members if each.name == group.name)
+            known = every.from_index * width + every.to_index
+            own = np.searchsorted(known, group.from_index * width + group.to_index)
+        pieces.append(part.start + own)
+    return np.concatenate(pieces)
 
 
 def _multipliers(problem: "DesignProblem", sample: Sample, x: Floats) -> tuple[float, Floats, Floats]:

@@ -254,11 +254,12 @@ def largest_gain(outcome: Outcome, whole: Case) -> float:
     found = pricing.price(outcome.case, built, problem, outcome.alpha)
     assert found is not None
     group, every = outcome.case.members[0], whole.members[0]
+    places = group.from_index * len(every.to_local) + group.to_index
     x = np.zeros(whole.n_design)
-    x[group.from_index * len(every.to_local) + group.to_index] = outcome.alpha
+    x[places] = outcome.alpha
     other = Evaluator(whole).problem(scalarisation)
     sample = other.evaluate(x)
-    slopes = pricing._slopes(other, sample, found.rows, found.linear)
+    slopes = pricing.slopes_with(found, pricing.gradients_of(sample), places) + found.linear @ other.linear.A
     return float((-slopes[x == 0.0]).max() / abs(sample.objective))
 
 
@@ -269,6 +270,22 @@ def test_where_the_result_says_that_no_candidate_gains_none_does(few: None) -> N
     assert outcome.status is RunStatus.CONVERGED
     assert "no one of 640 candidates would lower U by more than 1e-06 of it" in outcome.reason
     assert largest_gain(outcome, case_from(scene | {"members": stiff("enumerated")["members"]})) <= 1.01e-6
+
+
+def test_where_none_of_members_with_slack_gains_none_does(few: None) -> None:
+    scene = stiff()
+    scene["members"]["struts"]["law"] = {"type": "gap", "stiffness": 20000, "gap": 0.0005}
+    for k, at in enumerate(([-1, 0.1], [1, 0.3], [0.1, -1])):
+        scene["members"][f"stay{k}"] = {
+            "from": {"body": "engine", "at": [0.2 * at[0], 0.2]}, "to": {"body": "ground", "at": at},
+            "law": {"type": "spring", "stiffness": 3000, "damping": 20}, "design": False,
+        }  # fmt: skip
+    scene["objectives"] = {"G": {"response": {"displacement": {"body": "engine"}}, "over_time": "max"}}
+    outcome = run_session(case_from(scene))
+    assert outcome.status is RunStatus.CONVERGED
+    assert "no one of 640 candidates would lower G by more than 1e-06 of it" in outcome.reason
+    scene["members"]["struts"]["candidates"] = "enumerated"
+    assert largest_gain(outcome, case_from(scene)) <= 1.01e-6
 
 
 def test_several_starts_go_on_from_the_best_of_them(few: None, tmp_path: Path) -> None:
