@@ -7,7 +7,7 @@ of several peaks (a maximum that is minimised, a minimum that is maximised) ever
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.engine import Evaluator
-    from mdstopo.sensitivity.pricing import Asked
 
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
@@ -101,23 +100,30 @@ class DesignProblem:
         """What the engine finds at x, with as many rows as compete."""
         return self._with_all_that_compete(self._design(x), gradient)
 
-    def asked_of_members(self, evaluation: Evaluation, rows: Floats) -> "Asked":
-        """What the rows of U, each times its factor (R,), ask of members, built or not, at the last evaluation.
+    def asked_of_members(self, evaluation: Evaluation, rows: Floats) -> Any:
+        """What the rows of U and those of constraints on responses, each times its factor (R + C,), ask of members,
+        built or not, at the last evaluation.
 
-        Of springs between free bodies, where nothing is shared and no parameter varies.
+        Where nothing is shared and no parameter varies.
         """
-        places = {name: len(found) for name, found in evaluation.peaks.items()}
+        of_limits = {f"constraints[{i}]": evaluation.constraint_peaks[i] for i, _ in self._responses}
+        looked = {**evaluation.peaks, **of_limits}
+        places = {name: len(found) for name, found in looked.items()}
         unit = iter(np.eye(sum(places.values())))
         marked = {
-            name: tuple(peak._replace(gradient=next(unit)) for peak in found)
-            for name, found in evaluation.peaks.items()
+            name: tuple(Peak(peak.time, peak.value, next(unit)) for peak in found) for name, found in looked.items()
         }
         # the same rows with one number a peak in the place of its gradient: how a row is made of peaks
         other = copy(self)
         other.space = DesignSpace(sum(places.values()), None, ())
         other.initial = np.zeros(other.space.size)
         other._factor = None
-        weights = rows @ other.sample_of(evaluation._replace(peaks=marked)).gradients
+        peaks = {name: marked[name] for name in evaluation.peaks}
+        limits = {i: marked[f"constraints[{i}]"] for i, _ in self._responses}
+        sample = other.sample_of(evaluation._replace(peaks=peaks, constraint_peaks=limits))
+        weights = rows[: len(sample.rows)] @ sample.gradients
+        if len(rows) > len(sample.rows):
+            weights = weights + rows[len(sample.rows) :] @ sample.constraint_gradients
         ends = np.cumsum(list(places.values()))
         parts = zip(places, np.split(weights, ends[:-1]), strict=True)
         return self._evaluator.asked_of_members({name: part.tolist() for name, part in parts})

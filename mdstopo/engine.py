@@ -28,7 +28,7 @@ from mdstopo.scene.family import beyond_springs, collocates
 from mdstopo.scene.modes import Modes
 from mdstopo.scene.origin import extent_of, origin_of, seen_from, starting_places
 from mdstopo.scene.refusals import BY_PARAMETERS, no_derivatives, refusals
-from mdstopo.sensitivity.springs_driver import SPRINGS, SpringsDriver
+from mdstopo.sensitivity.springs_driver import SPRINGS
 from mdstopo.status import Status
 from mdstopo.warm import Beside
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from mdstopo.general.settle import Settled
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
-    from mdstopo.sensitivity.pricing import Asked, SpringCandidates
+    from mdstopo.sensitivity.candidate_pass import CandidatePass
 
 #: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
 #: else exceed ten tolerances on scenes whose members turn fast
@@ -56,15 +56,18 @@ class Evaluator:
 
     beside: compile with a second process at the first use on a machine; share: what else that does (`warm`). sample:
     0, or which of the scene's other roundings it computes (`scene.rounding`); what it tells is then not in the file's
-    coordinates. Raises CaseError where the case asks for what the engine cannot do yet.
+    coordinates. beyond: why the general kernels are needed although the case alone does not. Raises CaseError where the
+    case asks for what the engine cannot do yet.
     """
 
-    def __init__(self, case: Case, beside: bool = True, share: Sequence[str] = (), sample: int = 0) -> None:
+    def __init__(
+        self, case: Case, beside: bool = True, share: Sequence[str] = (), sample: int = 0, beyond: str = ""
+    ) -> None:
         refused = refusals(case)
         if refused:
             raise CaseError(refused, str(case.path or case.name))
         self.case = case
-        self.beyond = beyond_springs(case)
+        self.beyond = beyond_springs(case) or beyond
         self._usual = choose(case.solver, self.beyond, collocates(case))
         self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
         kind = INTEGRATORS[self._usual[0]]
@@ -112,6 +115,7 @@ class Evaluator:
         self._unsure = [group.name for group in case.members if any(law.may_lack_slopes for law in group.laws)]
         self._narrower: dict[tuple[str, ...], Evaluator] = {}
         self._others: dict[tuple[Any, ...], Evaluator] = {}
+        self._asked_beyond = beyond
 
     # -- what a run asks
 
@@ -230,33 +234,28 @@ class Evaluator:
 
         return Estimator(self)
 
-    def asked_of_members(self, weights: Mapping[str, Sequence[float]]) -> "Asked":
+    def asked_of_members(self, weights: Mapping[str, Sequence[float]]) -> Any:
         """What a weighted sum of peaks of the last evaluation asks of members, whether they are built or not.
 
-        weights: of the peaks of each objective, in their order. Of springs between free bodies, and after an evaluation
-        with gradients.
+        weights: of the peaks of each objective, and of each constraint on a response by its key path, in their order.
+        After an evaluation with gradients.
         """
-        from mdstopo.sensitivity.pricing import Asked
-
         parts = []
         for _, keys, driver in self._seen:
-            assert isinstance(driver, SpringsDriver)
             factor = np.zeros(driver.rows.shape[:2])
             for j, key in enumerate(keys):
                 factor[j, : len(weights[key])] = weights[key]
             parts.append(driver.asked_of_members(factor))
-        return Asked.of_all(parts)
+        return type(parts[0]).of_all(parts)
 
-    def candidates_of(self, group: MemberGroup, count: int | None = None) -> "SpringCandidates":
-        """The candidates of a priced group of springs between free bodies; count: about so many of them, None: all."""
-        from mdstopo.sensitivity.pricing import SpringCandidates
-
+    def candidates_of(self, group: MemberGroup, count: int | None = None) -> "CandidatePass[Any]":
+        """The candidates of a priced group; count: about so many of them, None: all."""
         place = self.case.members.index(group)
         own = self._near.members[place]
         ends = (group.from_world, group.to_world)
         if self._near is not self.case:
             ends = starting_places(self._near.bodies, own)
-        return SpringCandidates(own, next(iter(self.scenes.values())).model.block[place], ends, count)
+        return self._family.candidates(self.scenes, place, own, ends, count)
 
     def otherwise(self, sample: int = 0, **solver: Any) -> "Evaluator":
         """The evaluator of the same case with other solver settings, made once for each set of them.
@@ -266,7 +265,7 @@ class Evaluator:
         key = (sample, *sorted(solver.items()))
         if key not in self._others:
             case = replace(self.case, solver=replace(self.case.solver, **solver))
-            self._others[key] = Evaluator(case, self._compiles_beside, sample=sample)
+            self._others[key] = Evaluator(case, self._compiles_beside, sample=sample, beyond=self._asked_beyond)
         return self._others[key]
 
     def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
@@ -318,7 +317,8 @@ class Evaluator:
             return self
         if names not in self._narrower:
             chosen = tuple(objective for objective in self.case.objectives if objective.name in names)
-            self._narrower[names] = Evaluator(replace(self.case, objectives=chosen), beside=False)
+            narrower = replace(self.case, objectives=chosen)
+            self._narrower[names] = Evaluator(narrower, beside=False, beyond=self._asked_beyond)
         return self._narrower[names]
 
     def settled(self, alpha: FloatArray, load_case: str) -> "Settled | None":

@@ -88,7 +88,7 @@ def _pairs(_context: click.Context, _parameter: click.Parameter, values: tuple[s
 def open_case(path: Path, overrides: dict[str, str], alpha_path: Path | None = None) -> "Case":
     """Read a case and refuse what the engine cannot compute. Raises CaseError with every mistake.
 
-    alpha_path: of a design; where that is a run's result and candidates are priced, they are members that are there.
+    alpha_path: of a design; where that is a result and candidates are priced, they are members that are there.
     """
     from mdstopo.case.errors import CaseError
     from mdstopo.case.reader import load_case
@@ -98,11 +98,14 @@ def open_case(path: Path, overrides: dict[str, str], alpha_path: Path | None = N
     refused = refusals(case)
     if refused:
         raise CaseError(refused, str(path))
-    if case.priced_groups and alpha_path is not None and alpha_path.suffix.lower() in (".h5", ".hdf5"):
+    if case.priced_groups and alpha_path is not None:
+        from mdstopo.store.design_files import place_of
         from mdstopo.store.result_reader import read_result
         from mdstopo.store.stored_case import built_case
 
-        return built_case(read_result(alpha_path, leave_out=("optimizer", "trajectories")), case)
+        file, _ = place_of(str(alpha_path))
+        if file.suffix.lower() in (".h5", ".hdf5"):
+            return built_case(read_result(file, leave_out=("optimizer", "trajectories")), case)
     return case
 
 

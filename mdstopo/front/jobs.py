@@ -13,6 +13,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case, FloatArray
 from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.state import State
+from mdstopo.plan.priced_designs import packed
 from mdstopo.plan.solve_task import Found, Task, failed, solve
 from mdstopo.session.combining import NoUtopiaError
 from mdstopo.session.compiling_apart import compile_apart
@@ -77,8 +78,9 @@ def open_jobs(setting: Setting) -> Perform:
 
 
 def first(case: Case) -> FloatArray:
-    """The optimiser's x of the initial design."""
-    return case.space.reduce(case.start)
+    """The optimiser's x of the initial design; where candidates are priced with its members (`priced_designs`)."""
+    x = case.space.reduce(case.start)
+    return packed(case, x) if case.priced_groups else x
 
 
 def ready_engine(setting: Setting) -> Engine:
@@ -116,8 +118,9 @@ def run_trial(trial: Trial, stop: Callable[[], bool] | None = None) -> Found:
     objectives = np.array([outcome.objectives[each.name] for each in trial.case.objectives])
     state = outcome.states[outcome.best_start]
     assert state is not None
+    x = packed(outcome.case, state.best_alpha) if outcome.case.priced_groups else state.best_alpha
     return Found(
-        0, trial.key, state.best_alpha, objectives, float(state.best_objective), outcome.status, outcome.reason,
+        0, trial.key, x, objectives, float(state.best_objective), outcome.status, outcome.reason,
         outcome.evaluations, float(state.kkt), float(state.best_violation),
         np.array(outcome.history["objectives"], dtype=np.float64), time.perf_counter() - began, platform.node(),
     )  # fmt: skip

@@ -22,6 +22,8 @@ from mdstopo.front.pool import Here, Pool, Processes
 from mdstopo.optimizer.start_families import design_of_family
 from mdstopo.optimizer.state import State
 from mdstopo.plan.front_plan import Front, NoEndError, Planner, Request, Starts
+from mdstopo.plan.priced_designs import in_case, packed, with_all
+from mdstopo.plan.pricing_rounds import members_part
 from mdstopo.plan.solve_task import Found, Result, Task, failed, front_key
 from mdstopo.plan.stored_tasks import begun_part, read_begun, read_tasks, tasks_part
 from mdstopo.session.compiling_apart import compile_apart
@@ -36,6 +38,7 @@ from mdstopo.store.checkpoint import INTERVAL, Checkpointer
 from mdstopo.store.contents import Datasets, case_part
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
+from mdstopo.store.same_case import describe
 from mdstopo.store.store_errors import WriteError
 from mdstopo.store.writing import write_result
 from mdstopo.workers.worker_pool import Lost, StoppedError
@@ -131,6 +134,7 @@ def run_front(
     direction that is given twice.
     """
     check(case)
+    _check_starts(case, ask.starts)
     if len(np.unique(ask.directions, axis=0)) < len(ask.directions):
         raise ValueError("a direction is given twice")
     run = _FrontRun(case, ask, on_progress or ignore, stop_requested or never, notify or ignore, command)
@@ -156,6 +160,14 @@ def check(case: Case) -> None:
     if not case.n_design and not case.variables:
         mistakes.append(case.marks.mistake("members", NOTHING_VARIES))
     if mistakes:
+        raise CaseError(mistakes, str(case.path or case.name))
+
+
+def _check_starts(case: Case, starts: int) -> None:
+    """Refuse several starts of each solve where candidates are priced. Raises CaseError."""
+    if starts > 1 and case.priced_groups:
+        words = f"priced goes with one start of each point of a front, not {starts}"
+        mistakes = [case.marks.mistake(f"members.{each.name}.candidates", words) for each in case.priced_groups]
         raise CaseError(mistakes, str(case.path or case.name))
 
 
@@ -228,9 +240,10 @@ class _FrontRun:
         if path is not None:
             self.save(path, status, reason, front)
         tasks = tuple(self.taken.values())
-        part = front_part(self.case, self.ask.directions, front if front is not None else self.so_far(), tasks)
+        case, told = self.as_built(self.so_far() if front is None else front)
+        part = front_part(case, self.ask.directions, told, tasks)
         return FrontOutcome(
-            self.case, self.ask.directions, self.method, front, status, reason, tasks,
+            case, self.ask.directions, self.method, None if front is None else told, status, reason, tasks,
             sum(each.evaluations for each in tasks), self.quality,
             {name.removeprefix("pareto/"): value for name, value in part.items()},
             time.perf_counter() - began, path, self.warnings,
@@ -247,6 +260,7 @@ class _FrontRun:
             self.notify(replaced(stated, first))
         combine, chosen = self.case.combine, self.case.optimizer
         draw = partial(design_of_family, problem, chosen.seed)
+        first = packed(self.case, first) if self.case.priced_groups else first
         starts = Starts(first, self.ask.starts, draw, chosen.tolerance, self.case.n_design > 0)
         return Request(
             self.ask.directions, self.method, combine.exponent, combine.normalize,
@@ -302,6 +316,8 @@ class _FrontRun:
         if self.cluster is not None:
             return Cluster(self.setting, self.stop, self.cluster)
         wanted = cores() if self.workers is None else self.workers
+        if wanted > 1 and self.case.priced_groups:  # a part of such a task tells little of the whole
+            return Processes(self.setting, self.stop, wanted, self.notify)
         if wanted > 1:
             short = replace(task, iterations=LOOK, softened=False, iterate=-1, begun=None, quota=None)
             look = perform(self.setting, short, self.stop)
@@ -388,16 +404,30 @@ class _FrontRun:
         tasks = (self.solved if front is None else self.taken).values()
         datasets = self.fixed | tasks_part(tasks, self.case)
         settings = dict(self.settings)
+        case, told = self.as_built(self.so_far() if front is None else front)
+        datasets |= front_part(case, self.ask.directions, told, tasks)
+        if case.priced_groups:
+            datasets |= case_part(case) | {"resume/case": describe(self.case)} | members_part(case)
         if front is None:
-            datasets |= front_part(self.case, self.ask.directions, self.so_far(), tasks) | begun_part(self.begun)
+            datasets |= begun_part(self.begun)
         else:
-            datasets |= front_part(self.case, self.ask.directions, front, tasks)
             assert self.quality is not None
             settings |= self.quality.numbers()
             datasets |= {"pareto/ideal": self.quality.ideal, "pareto/nadir": self.quality.nadir}
-        write_result(
-            path, self.case, "pareto", status.value, reason, datasets, self.provenance, settings, self.warnings
-        )
+        write_result(path, case, "pareto", status.value, reason, datasets, self.provenance, settings, self.warnings)
+
+    def as_built(self, front: Front) -> tuple[Case, Front]:
+        """The case with all members that designs of a front have, where candidates are priced, and these designs as
+        the optimiser's x in it; otherwise what there is."""
+        if not self.case.priced_groups:
+            return self.case, front
+        case = with_all(self.case, [each.alpha for each in (*front.points, *front.ends) if each is not None])
+
+        def told(found: Found) -> Found:
+            return replace(found, alpha=in_case(case, found.alpha))
+
+        points = tuple(None if each is None else told(each) for each in front.points)
+        return case, replace(front, points=points, ends=tuple(told(each) for each in front.ends))
 
     def so_far(self) -> Front:
         """What the plan has reached; utopia and maxima are not known before the ends are."""

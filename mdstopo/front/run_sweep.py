@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mdstopo.case.candidates import pairs_of
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case
@@ -17,6 +18,7 @@ from mdstopo.front.directions import MOST, parse_range
 from mdstopo.front.jobs import Setting, Trial, first
 from mdstopo.front.pool import Here, Pool, Processes
 from mdstopo.front.run_front import WORTH, Snapshot
+from mdstopo.plan.priced_designs import in_case, with_all
 from mdstopo.plan.solve_task import Found, case_key, failed
 from mdstopo.plan.stored_tasks import read_tasks, tasks_part
 from mdstopo.session.compiling_apart import compile_apart
@@ -174,9 +176,6 @@ def _cases(
             new = [mistake for mistake in error.mistakes if str(mistake) not in seen]
             seen |= {str(mistake) for mistake in new}
             mistakes += new
-    words = "found priced, allowed in a sweep is enumerated: its designs are to have the same members"
-    for case in cases:
-        mistakes += [case.marks.mistake(f"members.{group.name}.candidates", words) for group in case.priced_groups]
     if mistakes:
         raise CaseError(mistakes, str(case_path))
     return cases
@@ -192,7 +191,7 @@ class _Sweep:
         self.keys = keys
         self.values = values
         self.runs = [case_key(case) for case in cases]
-        self.spaces = [case.space for case in cases]
+        self.cases = cases
         self.solved: dict[str, Found] = {}
         self.fixed: Datasets = case_part(base)
         self.provenance = Provenance.collect(command)
@@ -238,9 +237,17 @@ class _Sweep:
         for k, key in enumerate(self.keys):
             part[f"values/{key}"] = [row[k] for row in self.values]
         tasks = [each for each in done if each is not None]
-        for i, (each, space) in enumerate(zip(done, self.spaces, strict=True)):
+        for i, (each, case) in enumerate(zip(done, self.cases, strict=True)):
             if each is not None:
-                design = space.expand(each.alpha)
+                space, x = case.space, each.alpha
+                if case.priced_groups:  # each run has members of its own
+                    built = with_all(case, [x])
+                    space, x = built.space, in_case(built, x)
+                    for name, ends in pairs_of(built).items():
+                        part |= {
+                            f"members/{i}/{name}/{end}": index for end, index in zip(("from", "to"), ends, strict=True)
+                        }
+                design = space.expand(x)
                 part[f"alpha/{i}"] = design[: space.n_alpha]
                 part |= {f"variables/{i}/{name}": values for name, values in space.named(design).items()}
         datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}

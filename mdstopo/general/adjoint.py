@@ -100,7 +100,7 @@ def apply_saltation_transposed(model, history, state, lam_q, lam_v, bar_set, dro
 @kernel
 def sweep(
     tag, model, tables, member_state, history, count, w, c, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar, drops,
-    looked, square, workspace, out, work,
+    looked, square, workspace, virtual, out, work,
 ):  # fmt: skip
     """Pull cotangents of fraction c of step w's motion back to the start, and gather the gradient at every stage.
 
@@ -119,6 +119,7 @@ def sweep(
       bar_set (slots,): cotangents of the permanent sets.
       member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
+      virtual (S, n): virtual displacements of the stages that are gone through; no rows: not wanted.
       out (M_padded + P,): the derivative by alpha^mu and, behind the members, by parameters, added to.
       workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
@@ -142,6 +143,8 @@ def sweep(
         restore_modes(history, history.index[w, EVENTS], member_state)
         segment = history.index[w, SEGMENT]
         add_designs(model, segment, history, o, member_state, z[0, : end - o], out, work)
+        if virtual.shape[0] > 0:
+            virtual[o:end] = z[0, : end - o]
         if bar_set.shape[0] > 0:
             for j in range(end - o):
                 add_sets(
@@ -157,6 +160,34 @@ def sweep(
         if before >= 0:
             apply_saltation_transposed(model, history, before + 1, lam_q, lam_v, bar_set, drops, member_state, out)
         w = before
+
+
+@kernel
+def state_of_row(tag, model, tables, member_state, history, count, row, workspace, q, v, work):
+    """The state at which a row of `extremes` is read.
+
+    Constant:
+      tag, tables: the integrator (`method_interface`) and its coefficients.
+      model: the compiled scene.
+      count: how many steps there are.
+      row (COLUMNS,): the row.
+    In and out:
+      history: the history of steps; a partial step is kept behind the others where the integrator needs one.
+      member_state (3, columns): state of the members; modes and sets are put to those of the step.
+    Out:
+      q (n_q,), v (n,): coordinates and velocities.
+      workspace: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
+
+    Returns the step that the state is an end of or in (-1: the start).
+    """
+    k = int(row[2])
+    c = row[3]
+    if c > 0.0 and c < 1.0:
+        return point_of(tag, model, tables, member_state, history, count, k, c, np.bool_(True), workspace, q, v, work)
+    copy_vector(history.q[k if c <= 0.0 else k + 1], q)
+    copy_vector(history.v[k if c <= 0.0 else k + 1], v)
+    return k - 1 if c <= 0.0 else k
 
 
 @kernel
@@ -194,15 +225,8 @@ def row_cotangents(
     out[:] = 0.0
     k = int(row[2])
     c = row[3]
-    w = k
     segment = history.index[k, SEGMENT]
-    if c <= 0.0 or c >= 1.0:
-        copy_vector(history.q[k if c <= 0.0 else k + 1], q)
-        copy_vector(history.v[k if c <= 0.0 else k + 1], v)
-        if c <= 0.0:
-            w = k - 1
-    else:
-        w = point_of(tag, model, tables, member_state, history, count, k, c, np.bool_(True), workspace, q, v, work)
+    w = state_of_row(tag, model, tables, member_state, history, count, row, workspace, q, v, work)
     t = history.t[k] + c * (history.t[k + 1] - history.t[k])
     restore_modes(history, history.index[k, EVENTS], member_state)
     rate = row[4]
@@ -309,8 +333,9 @@ def integral_gradient(
     rows_bar = np.zeros((stages, model.size[0]))
     sets_bar = np.zeros((stages, count_sets(model)))
     total = integral_cotangents(
-        tag, model, tables, member_state, history, count, j, square, bars, rows_bar, sets_bar, workspace, out, work
-    )
+        tag, model, tables, member_state, history, count, j, square, bars, rows_bar, sets_bar, np.empty(0), workspace,
+        out, work,
+    )  # fmt: skip
     if gradient:
         lam_q = np.zeros(n)
         lam_v = np.zeros(n)
@@ -320,7 +345,7 @@ def integral_gradient(
         bar_set = np.zeros(sets_bar.shape[1])
         sweep(
             tag, model, tables, member_state, history, count, count - 1, 1.0, lam_q, lam_v, bar_set, bars, rows_bar,
-            sets_bar, drops, j, square, workspace, out, work,
+            sets_bar, drops, j, square, workspace, np.empty((0, n)), out, work,
         )  # fmt: skip
         keep_start(model, history, lam_q, bar_set, start, out)
     return total
@@ -537,8 +562,9 @@ def _turn(slopes, rows):
 
 @kernel
 def integral_cotangents(
-    tag, model, tables, member_state, history, count, j, square, bars, rows_bar, sets_bar, workspace, out, work
-):
+    tag, model, tables, member_state, history, count, j, square, bars, rows_bar, sets_bar, energies, workspace, out,
+    work,
+):  # fmt: skip
     """The integral over time of g_j (or of its square) by the weights of the stages, and its cotangents of all stages.
 
     Constant:
@@ -551,6 +577,7 @@ def integral_cotangents(
     Out; no derivative is formed where bars has no rows:
       bars (S, 3, n), rows_bar (S, n_row), sets_bar (S, slots): cotangents of the stages' q, v, a, of their multipliers
         and of the permanent sets; zeros before the call.
+      energies (S,): the derivatives by the energy that is stored at each stage; no length: not wanted.
       out (M_padded + P,): the explicit derivative by alpha^mu and by parameters.
       workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
@@ -631,6 +658,8 @@ def integral_cotangents(
                 weighed = energy_weight(model, j, of_parts)
                 if weighed != 0.0:
                     add_design(model, segment, t, member_state, q, v, a, none, factor * weighed, out, work)
+                    if energies.shape[0] > 0:
+                        energies[o + i] = factor * weighed
             shares = ties if who == mine and ties > 1 else 1
             factor /= shares
             bars[o + i] = 0.0

@@ -251,7 +251,8 @@ def _members(
             middle = 0.5 * (times[:-1] + times[1:])
             known = np.zeros((segments, 2)) if kernels.signal is None else segment_values(kernels.signal(record), times)
             parts = np.arange(len(group))[:, None] if each_member(case, group, place) else np.arange(len(group))[None]
-            row = row_of(group, elastic=len(parts) == 1)[1]
+            # rows of a grid share their first ends, which a turned group has on the ground
+            row = row_of(group, elastic=len(parts) == 1)[1] if first_body == group.body_from else 0
             for part in parts:
                 count = len(part)
                 padded = -(-count // VECTOR) * VECTOR

@@ -415,7 +415,7 @@ def push(
     if integral > 0:
         integral_cotangents(
             tag, model, tables, member_state, history, count, j, integral == 2, stage_bars, rows_bar, sets_bar,
-            workspace, padded, work,
+            np.empty(0), workspace, padded, work,
         )  # fmt: skip
         drops = event_drops(model, member_state, history, count, j, integral == 2, workspace)
     else:

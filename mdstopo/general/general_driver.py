@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.memory import most_floats
-from mdstopo.case.model import GROUND, Case
+from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.case.responses import kind_of
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.competing_members import compete, members_peaks
@@ -60,6 +60,7 @@ from mdstopo.scene.modes import Modes
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
+    from mdstopo.general.pricing import AskedOfMembers, GeneralCandidates
     from mdstopo.general.settle import Settled
 
 #: peaks kept of one response, unless told otherwise
@@ -106,6 +107,8 @@ class GeneralDriver:
         #: how the value of every response is formed: plain, absolute, a norm (`evaluation.Peak.shape`)
         self.shapes: tuple[Shape, ...] = tuple(shape_of(model, j, name) for j, name in enumerate(scene.reductions))
         self.where = np.full(3, -1, dtype=np.int64)
+        #: steps of the last run
+        self.count = 0
         n = len(model.mass)
         #: arrays for the results of `evaluate_one`, and of `_integral_with_gradient`
         self._one = (
@@ -527,6 +530,7 @@ class GeneralDriver:
             )  # fmt: skip
             if code != NEEDS_ROOM:
                 code, count, time = self._up_to_half_a_turn(code, count, time)
+                self.count = count
                 self._message = self._explain(code, time)
                 return code, count, time
             if not self._grow():
@@ -586,6 +590,18 @@ class GeneralDriver:
         places = np.stack([step.astype(np.float64), (times - t[step]) / (t[step + 1] - t[step])], axis=1)
         responses = range(len(self.scene.responses))
         return np.array([self.sample_response(j, places, True, count)[2][:, 0] for j in responses])
+
+    @property
+    def model_of_run(self) -> GeneralModel:
+        """The model of the last evaluation, with the times at which its steps had to end."""
+        more = self.quadrature_breakpoints
+        return landed(self.with_start(), more) if more else self._model
+
+    def asked_of_members(self, factor: FloatArray) -> "AskedOfMembers":
+        """What rows of the last evaluation, each times its factor (n_resp, R), ask of any member; with gradients."""
+        from mdstopo.general.pricing import asked_of
+
+        return asked_of(self, factor)
 
     @property
     def times(self) -> FloatArray:
@@ -762,4 +778,14 @@ def _scenes(case: Case) -> Mapping[str, GeneralScene]:
     return {load_case.name: compile_general(case, load_case) for load_case in case.load_cases}
 
 
-GENERAL = SceneFamily(_scenes, GeneralDriver)
+def _candidates(
+    scenes: Mapping[str, Any], place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None
+) -> "GeneralCandidates":
+    """The candidates of a priced group; the scenes tell nothing that their cases do not."""
+    from mdstopo.general.pricing import GeneralCandidates
+
+    del scenes
+    return GeneralCandidates(place, group, homes, count)
+
+
+GENERAL = SceneFamily(_scenes, GeneralDriver, _candidates)

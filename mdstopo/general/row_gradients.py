@@ -27,6 +27,41 @@ class _Block(NamedTuple):
     starts: FloatArray
 
 
+class WantedRow(NamedTuple):
+    """A row of which a derivative is wanted, or a part of one.
+
+    response, row: numbers of what it belongs to. aside: 1 where the component across a norm's vector is meant, else 0.
+    share: of the derivative of that. at (COLUMNS,): the row that is differentiated (`extremes`).
+    """
+
+    response: int
+    row: int
+    aside: int
+    share: float
+    at: FloatArray
+
+
+def wanted_rows(driver: "GeneralDriver", across: bool) -> list[WantedRow]:
+    """All that the derivatives of the rows that a driver has found are put together from, the latest first; without
+    integrals, but for what jumps in them. across: what is across of norms, too."""
+    wanted = [
+        WantedRow(j, r, aside, share, part)
+        for j, reduction in enumerate(driver.scene.reductions)
+        if reduction not in INTEGRALS
+        for r in range(driver.found.item(j))
+        for share, part in parts(driver.rows[j, r])
+        for aside in range(2 if across and driver.shapes[j] == "norm" else 1)
+    ]
+    wanted += [WantedRow(j, 0, 0, factor, row) for j, rows in driver.jumps.items() for factor, row in rows]
+    wanted.sort(key=lambda row: (-row.at.item(STEP), -row.at.item(FRACTION)))
+    return wanted
+
+
+def sign_of(driver: "GeneralDriver", j: int, r: int) -> float:
+    """The sign with which the derivative of what row r of response j looks at stands in that of the response."""
+    return driver.rows.item(j, r, SIGN) if driver.scene.reductions[j] == "max_abs" else 1.0
+
+
 class RowGradients:
     """The gradients of the rows of one driver, by reverse sweeps through its last motion of many rows at once."""
 
@@ -38,16 +73,7 @@ class RowGradients:
         """Fill the driver's `gradients`, for a motion of so many steps; what is across of norms, too, where there is an
         array for it."""
         driver = self._driver
-        wanted = [
-            (j, r, aside, share, part)
-            for j, reduction in enumerate(driver.scene.reductions)
-            if reduction not in INTEGRALS
-            for r in range(driver.found.item(j))
-            for share, part in parts(driver.rows[j, r])
-            for aside in range(1 if across is None or driver.shapes[j] != "norm" else 2)
-        ]
-        wanted += [(j, 0, 0, factor, row) for j, rows in driver.jumps.items() for factor, row in rows]
-        wanted.sort(key=lambda row: (-row[4].item(STEP), -row[4].item(FRACTION)))  # the latest first
+        wanted = wanted_rows(driver, across is not None)
         for j, reduction in enumerate(driver.scene.reductions):
             if reduction not in INTEGRALS:
                 driver.gradients[j, : driver.found[j]] = 0.0
@@ -67,8 +93,7 @@ class RowGradients:
                 if aside and across is not None:
                     across[j, r] += share * own
                 else:
-                    flip = driver.rows[j, r, SIGN] if driver.scene.reductions[j] == "max_abs" else 1.0
-                    driver.gradients[j, r] += flip * share * own
+                    driver.gradients[j, r] += sign_of(driver, j, r) * share * own
 
     def compile(self) -> None:
         """Have the machine code for it on the disk."""

@@ -85,7 +85,7 @@ def integral_by_place(
     sets_bar = np.zeros((stages, count_sets(model)))
     integral_cotangents(
         tag, model, tables, member_state, history, count, j, integral == 2, bars, rows_bar, sets_bar,
-        make_workspace(model), padded, work,
+        np.empty(0), make_workspace(model), padded, work,
     )  # fmt: skip
     none = np.zeros(n)
     own = np.empty((3, n))

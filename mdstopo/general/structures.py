@@ -19,8 +19,14 @@ def __getattr__(name: str) -> type:
     kernel's cache lists all the types that it was ever compiled for.
     """
     if name.endswith(_ENDING) and name not in _KINDS:
-        from mdstopo.general import accelerations, dense_output, gauss_window, model, step_history  # noqa: F401
-        # (which have them)
+        from mdstopo.general import (  # noqa: F401 (which have them)
+            accelerations,
+            candidate_prices,
+            dense_output,
+            gauss_window,
+            model,
+            step_history,
+        )
 
         numba()
     try:

@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from mdstopo.case.integrators import IntegratorKind
-from mdstopo.case.model import Case, LoadCase, Objective, ResponseRow
+from mdstopo.case.model import Case, LoadCase, MemberGroup, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.modes import Modes
@@ -19,6 +19,7 @@ from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.general.settle import Settled
+    from mdstopo.sensitivity.candidate_pass import CandidatePass
 
 
 @dataclass(frozen=True)
@@ -137,14 +138,16 @@ class SceneDriver(Protocol):
 
     Designs are alpha (N,), and behind it the values (P,) of the case's variables. Members are told by their place in
     the padded arrays of the scene. settings: tolerance of the motion, of Newton's iteration, fixed step (s), window of
-    competing peaks. shapes: how the value of each response is formed (`evaluation.Peak`). work (WORK,): counts of the
-    last call. room: where the steps are kept.
+    competing peaks. rows: of the last `ResponseResult`. shapes: how the value of each response is formed
+    (`evaluation.Peak`). work (WORK,): counts of the last call. room: where the steps are kept.
     """
 
     @property
     def scene(self) -> Scene: ...
     @property
     def settings(self) -> FloatArray: ...
+    @property
+    def rows(self) -> FloatArray: ...
     @property
     def shapes(self) -> tuple[Shape, ...]: ...
     @property
@@ -190,6 +193,10 @@ class SceneDriver(Protocol):
     def start_modes(self, alpha: FloatArray) -> Modes:
         """Small motion about the start."""
 
+    def asked_of_members(self, factor: FloatArray) -> Any:
+        """What rows of the last evaluation, each times its factor (n_obj, R), ask of any member, built or not; with
+        gradients. Its `of_all` puts those of several scenes together; `SceneFamily.candidates` takes it."""
+
     def settled(self, alpha: FloatArray) -> "Settled | None":
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
 
@@ -215,8 +222,13 @@ class DriverOptions:
 class SceneFamily(NamedTuple):
     """What one family of kernels computes.
 
-    scenes: the load cases of a case as scenes, by name. driver: the driver of one of them.
+    scenes: the load cases of a case as scenes, by name. driver: the driver of one of them. candidates: those of a
+    priced group, from the scenes, the group's number and the group as the scenes have it, where its points P and Q are
+    at the start, (n, d) each, and about how many are meant (None: all).
     """
 
     scenes: Callable[[Case], Mapping[str, Scene]]
     driver: Callable[[Case, Any, DriverOptions], SceneDriver]
+    candidates: Callable[
+        [Mapping[str, Any], int, MemberGroup, tuple[FloatArray, FloatArray], int | None], "CandidatePass[Any]"
+    ]

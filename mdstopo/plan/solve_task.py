@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 
 from mdstopo._version import __version__
 from mdstopo.case.model import Case
+from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.interface import Optimizer, make, run
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
+from mdstopo.plan.priced_designs import packed, unpacked
+from mdstopo.plan.pricing_rounds import Rounds
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.starts.callbacks import never
 from mdstopo.starts.constraint_columns import constraint_values
@@ -73,7 +76,8 @@ class Task:
 class Found:
     """What a task has found.
 
-    alpha (n,): its best design, as the optimiser's x (`case.space`); objectives (m,): all raw G there, NaN where it
+    alpha (n,): its best design, as the optimiser's x (`case.space`), or where candidates are priced with its members
+    (`priced_designs`), as `Task.start` is; objectives (m,): all raw G there, NaN where it
     could not be evaluated; combined: U; visited (K, m): raw G of every iterate, NaN of objectives that were not
     simulated; the last row is the design that is kept and has all. violations (K,): the largest excess of each over a
     constraint, relative to its bound; violation: that of alpha. kkt: the projected residual at the last iterate,
@@ -147,7 +151,24 @@ def solve(
     the end.
     """
     began = time.perf_counter()
+    if case.priced_groups:
+        found = _priced(engine, case, task, key, stop, keep)
+        return replace(found, seconds=time.perf_counter() - began, host=platform.node())
     problem = engine.problem(task.scalarisation)
+    state = _gone(case, problem, task, stop, keep)
+    if task.iterate >= 0:
+        found = _iterate(engine, case, task, key, state)
+    elif task.quota is not None:
+        return state
+    else:
+        found = _end(engine, case, task, key, state)
+    return replace(found, seconds=time.perf_counter() - began, host=platform.node())
+
+
+def _gone(
+    case: Case, problem: Problem, task: Task, stop: Callable[[], bool] | None, keep: Callable[[State], None] | None
+) -> State:
+    """The state of the optimiser as far as a task goes; arguments as of `solve`. Raises StoppedError."""
     optimizer = _optimizer(case, problem, task)
     first = task.begun if task.begun is not None else _first(optimizer, task, stop)
     latest = first
@@ -164,13 +185,51 @@ def solve(
     state = run(optimizer, first, on_iteration=reached, stop_requested=left)
     if not _is_there(task, state):
         raise StoppedError
-    if task.iterate >= 0:
-        found = _iterate(engine, case, task, key, state)
-    elif task.quota is not None:
-        return state
-    else:
-        found = _end(engine, case, task, key, state)
-    return replace(found, seconds=time.perf_counter() - began, host=platform.node())
+    return state
+
+
+def _priced(
+    engine: Engine,
+    case: Case,
+    task: Task,
+    key: str,
+    stop: Callable[[], bool] | None,
+    keep: Callable[[State], None] | None,
+) -> Found:
+    """What a task comes to where candidates are priced; its designs are those of `priced_designs`.
+
+    States are kept of the first round, from whose end later ones are gone through again. Of the designs on the way only
+    the last is told: each round has members of its own.
+
+    engine: the evaluator of the case as it was read.
+    case: the design problem.
+    task: what is optimised, and from where.
+    key: the task's hash, which its result carries.
+    stop: asked after each iteration whether to stop; None never stops.
+    keep: is given every state of the first round.
+    """
+    built, alpha = unpacked(case, task.start)
+    if built.n_design != case.n_design:
+        engine = make_engine(built)
+    rounds = Rounds(built)
+    problem = engine.problem(task.scalarisation)
+    state = _gone(built, problem, replace(task, start=alpha), stop, keep)
+    evaluations = int(state.evaluations)
+    while rounds.go_on(engine, problem, state):
+        engine = make_engine(rounds.case)
+        problem = engine.problem(task.scalarisation)
+        state = _gone(rounds.case, problem, replace(task, start=rounds.design, begun=None), stop, None)
+        evaluations += int(state.evaluations)
+    status, reason = rounds.conclude(state)
+    objectives, excess = _final(engine, rounds.case, state.best_alpha)
+    if not np.isfinite(objectives).all():
+        status, reason = RunStatus.FAILED, "the design that was found cannot be evaluated in every load case"
+    kept = np.array_equal(state.best_alpha, state.alpha)
+    return Found(
+        task.point, key, packed(rounds.case, state.best_alpha), objectives, float(state.best_objective), status, reason,
+        evaluations, float(state.kkt) if kept else float("nan"), excess, objectives[None],
+        violations=np.array([excess]),
+    )  # fmt: skip
 
 
 def _is_there(task: Task, state: State) -> bool:

@@ -3,7 +3,7 @@
 Motions, frequencies and what else belongs to one scene are those of the nominal case.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.error_estimate import ErrorEstimate
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows
 from mdstopo.integrators.steps import WORK_NAMES
-from mdstopo.robust.points import evaluator_at, name_of, nominal_case
+from mdstopo.robust.points import evaluator_at, name_of, nominal_evaluator
 from mdstopo.robust.robust_measures import rows, slopes
 from mdstopo.robust.sample import Sample, design_sample
 from mdstopo.status import Status
@@ -66,7 +66,7 @@ class Ensemble(Evaluator):
         self._wanted = range(len(self.sample)) if any(m.name != "nominal" for m in measures) else range(0)
         if points is None:
             points = {i: evaluator_at(case, self.sample, i) for i in range(len(self.sample))}
-            points[NOMINAL] = Evaluator(nominal_case(case), beside=False)
+            points[NOMINAL] = nominal_evaluator(case, beside=False)
         self.points = points
 
     # -- what a run asks
@@ -153,6 +153,28 @@ class Ensemble(Evaluator):
         """Bytes of the steps that are held between calls."""
         return super().held + sum(point.held for point in self.points.values())
 
+    def asked_of_members(self, weights: Mapping[str, Sequence[float]]) -> Any:
+        """As of `Evaluator`; every point is evaluated once more in this process, whoever did it before."""
+        wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
+        design = self._design.values.copy()
+        parts = {i: self.part(i, design, True, None) for i in wanted}
+        counts = {(i, *place): len(peaks) for i, part in parts.items() for place, peaks in _places(part)}
+        unit = iter(np.eye(sum(counts.values())))
+        # the same parts with one number a peak in the place of its gradient: how a measure is made of them
+        marked = {i: _marked(part, unit) for i, part in parts.items()}
+        looked = self._looked(marked)
+        shares = np.zeros(sum(counts.values()))
+        for key, factors in weights.items():
+            for factor, peak in zip(factors, looked[key], strict=False):
+                assert peak.gradient is not None
+                shares += factor * peak.gradient
+        asked = []
+        pieces = iter(np.split(shares, np.cumsum(list(counts.values()))[:-1]))
+        for i, part in parts.items():
+            own = {_key(place): next(pieces).tolist() for place, _ in _places(part)}
+            asked.append(self.points[i].asked_of_members(own))
+        return type(asked[0]).of_all(asked)
+
     # -- points
 
     def spread(self, workers: "PointWorkers | None") -> None:
@@ -228,3 +250,30 @@ class Ensemble(Evaluator):
     @property
     def _limits(self) -> list[int]:
         return [i for i, row in enumerate(self.case.constraints) if isinstance(row, ResponseRow)]
+
+
+#: an objective by its name, or a constraint by its place
+Place = tuple[str, int]
+
+
+def _places(part: Part) -> list[tuple[Place, tuple[Peak, ...]]]:
+    """The peaks of a part: of objectives, then of constraints."""
+    objectives = [((name, -1), peaks) for name, peaks in part.peaks.items()]
+    return objectives + [(("", place), peaks) for place, peaks in part.limits.items()]
+
+
+def _key(place: Place) -> str:
+    """An objective's name, or a constraint's key path."""
+    name, number = place
+    return name or f"constraints[{number}]"
+
+
+def _marked(part: Part, unit: Iterator[FloatArray]) -> Part:
+    """The same part with the next unit vectors in the places of its gradients."""
+    found = [tuple(Peak(peak.time, peak.value, next(unit)) for peak in peaks) for _, peaks in _places(part)]
+    names = len(part.peaks)
+    return replace(
+        part,
+        peaks=dict(zip(part.peaks, found[:names], strict=True)),
+        limits=dict(zip(part.limits, found[names:], strict=True)),
+    )

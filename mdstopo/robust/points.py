@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from mdstopo.case.candidates import pairs_of, with_members
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case, Uncertainty
 from mdstopo.case.reader import read_case
@@ -11,6 +12,7 @@ from mdstopo.case.words import inside
 from mdstopo.engine import Evaluator
 from mdstopo.robust.compatible_cases import other_problem
 from mdstopo.robust.sample import Sample
+from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.refusals import refusals
 
 #: numbers of a point that are told in a message
@@ -31,6 +33,7 @@ def case_at(case: Case, sample: Sample, i: int) -> Case:
         made = read_case(case.text, path=case.path, overrides=overrides, without=("uncertainty",))
     except CaseError as error:
         raise _refused(case, sample, i, error.mistakes) from None
+    made = with_members(made, pairs_of(case)) if case.priced_groups else made
     other = other_problem(case, made)
     if other:
         raise _refused(case, sample, i, [Mistake("", other, 1, 1)])
@@ -52,12 +55,23 @@ def evaluator_at(case: Case, sample: Sample, i: int) -> Evaluator:
     """The evaluator of point i, ready to run. Raises CaseError as `case_at`, also for joints that do not fit there."""
     there = case_at(case, sample, i)
     try:
-        made = Evaluator(there, beside=False)
+        made = Evaluator(there, beside=False, beyond=beyond_of(case))
         for load_case in made.scenes if made.beyond else ():
             made.driver(load_case)
     except CaseError as error:
         raise _refused(case, sample, i, error.mistakes) from None
     return made
+
+
+def nominal_evaluator(case: Case, beside: bool = True) -> Evaluator:
+    """The evaluator of the case as it is written; beside: as of `Evaluator`."""
+    return Evaluator(nominal_case(case), beside, beyond=beyond_of(case))
+
+
+def beyond_of(case: Case) -> str:
+    """Why the points of an uncertain case need the general kernels, where one alone does not: all have to be priced
+    together."""
+    return beyond_springs(case) if case.priced_groups else ""
 
 
 def settings(uncertainty: Uncertainty, sample: Sample, i: int) -> dict[str, Any]:

@@ -8,10 +8,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from mdstopo.case.model import Case
-from mdstopo.engine import Evaluator
 from mdstopo.evaluation import FloatArray
 from mdstopo.robust.ensemble import Ensemble, Part
-from mdstopo.robust.points import evaluator_at, nominal_case
+from mdstopo.robust.points import evaluator_at, nominal_case, nominal_evaluator
 from mdstopo.robust.sample import Sample, design_sample
 from mdstopo.robust.trial import Trial, tried
 from mdstopo.starts.evaluator_interface import even, problem_of
@@ -75,7 +74,7 @@ def open_points(case: Case) -> Perform:
     """In a worker: get ready for points of the case's sample, or of another one."""
     assert case.uncertainty is not None
     nominal = nominal_case(case)
-    engine = Evaluator(nominal)
+    engine = nominal_evaluator(case)
     # the kernels in the one order in which every process loads them
     get_ready(nominal, engine, problem_of(engine, even(nominal)), None)
     sample = design_sample(case.uncertainty)

@@ -28,6 +28,8 @@ def beyond_springs(case: Case) -> str:
         return "prescribed motions"
     if any(formulas_of(load_case) for load_case in case.load_cases):
         return "loads that are formulas of time"
+    if case.priced_groups and case.uncertainty is not None:
+        return "priced candidates of an uncertain case"
     if case.variables:
         return "movable points" if all(each.points for each in case.variables) else "design variables of laws"
     for group in case.members:

@@ -116,18 +116,7 @@ def _unpriced(case: Case, group: MemberGroup) -> Iterator[tuple[str, str]]:
     for key in ("shared", "mirrored", "variables"):
         if getattr(case, key):
             yield where, f"priced does not go with design.{key}"
-    beyond = beyond_springs(case)
-    if beyond and not case.variables:
-        yield (
-            where,
-            "priced is for springs between free bodies in the plane with an objective of stored energy, "
-            f"not for {beyond}",
-        )
-    if case.uncertainty is not None:
-        yield where, "priced does not go with uncertain values"
+    if case.solver.settle:
+        yield where, "priced does not go with static settling: a little of any candidate moves the start"
     if case.solver.sensitivity not in ("auto", "adjoint"):
         yield where, f"priced needs sensitivity: adjoint, not {case.solver.sensitivity}"
-    if len(case.objectives) > 1:
-        yield where, "priced does not go with several objectives"
-    if case.optimizer.starts > 1:
-        yield where, f"priced goes with one start, not {case.optimizer.starts}"

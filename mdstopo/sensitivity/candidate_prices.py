@@ -284,7 +284,7 @@ def _price_strips(
             tile = i * out.shape[1] + j
             for at in range(built[tile], built[tile + 1]):
                 price[places[at]] = np.inf
-            _sum_tile(price, home, common, out[i, j])
+            sum_tile(price, home, common, out[i, j])
         i = taken(counter)
 
 
@@ -336,7 +336,7 @@ def _fill_tile(first, second, first_home, second_home, row, column, free, member
 
 
 @part
-def _sum_tile(price, home, common, out):
+def sum_tile(price, home, common, out):
     """What is kept of a tile.
 
     In:

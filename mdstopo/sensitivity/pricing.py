@@ -1,12 +1,11 @@
 """From Python to the compiled entries that price candidates (`candidate_prices`): what they ask for, what they tell."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from mdstopo.case.candidates import lengths_between, spread
+from mdstopo.case.candidates import lengths_between
 from mdstopo.case.model import GROUND, MemberGroup, SpringLaw
 from mdstopo.compiler.threads import allowed
 from mdstopo.integrators.steps import FIRST, WORK, carve
@@ -31,34 +30,12 @@ from mdstopo.scene.model import (
     IndexArray,
 )
 from mdstopo.sensitivity import candidate_prices as kernels
-from mdstopo.sensitivity.candidate_prices import (
-    ABOVE,
-    BELOW,
-    BEST,
-    BROAD,
-    COMMON,
-    COST,
-    F0,
-    FREE,
-    NO_ROOM,
-    RATIO,
-    SEEN,
-    TALL,
-    TILE_NUMBERS,
-    TOGETHER,
-    UPPER,
-    WORTH,
-    C,
-    K,
-)
+from mdstopo.sensitivity.candidate_pass import CandidatePass
+from mdstopo.sensitivity.candidate_prices import BROAD, F0, FREE, NO_ROOM, TALL, TILE_NUMBERS, C, K
 
 if TYPE_CHECKING:
     from mdstopo.sensitivity.springs_driver import SpringsDriver
 
-#: tiles of which all candidates are looked at, of those with the largest gains
-TILES = 64
-#: of a tile, how many are told before any is of which so many are told already
-SHARE = 8
 #: members that are priced at once
 AT_ONCE = 1 << 16
 
@@ -109,30 +86,10 @@ def asked_of(driver: "SpringsDriver", factor: FloatArray) -> Asked:
         more *= 4
 
 
-@dataclass(frozen=True)
-class Passed:
-    """What a pass over the candidates of a group has found, beside its members.
-
-    seen: how many there are. best: the largest gain of one (of the objective, to first order, with alpha at its upper
-    bound), together: the sum over all that gain; ratio: the largest gain for a unit of cost. i, j (K,), gain (K,):
-    those with the largest gains, largest first, though some may be below zero.
-    """
-
-    seen: int
-    best: float
-    together: float
-    ratio: float
-    i: IndexArray
-    j: IndexArray
-    gain: FloatArray
-
-
-class SpringCandidates:
+class SpringCandidates(CandidatePass[Asked]):
     """The candidates of a group of springs between free bodies, in the plane.
 
-    group: as the scene has it; block: its row of `Model.block`; homes: where its points P and Q are at the start,
-    (n, 2) each; count: about how many of them, evenly spread; None: all. Inside, the points of that body come first
-    that comes first in the scene.
+    group: as the scene has it; block: its row of `Model.block`; homes, count: as of `CandidatePass`.
     """
 
     def __init__(
@@ -142,102 +99,33 @@ class SpringCandidates:
         homes: tuple[FloatArray, FloatArray],
         count: int | None = None,
     ) -> None:
+        # as `scene.origin.ends_of` has it
+        super().__init__(group, homes, group.body_to == GROUND and not block[WIDTH], count)
         (law,) = group.laws
         assert isinstance(law, SpringLaw)
-        assert group.candidates is not None
-        self._law, self._candidates, self._upper = law, group.candidates, group.upper
-        self._kind, self.pair = int(block[KIND]), int(block[PAIR])
-        # as `scene.origin.ends_of` has it
-        turned = group.body_to == GROUND and not block[WIDTH]
-        self._order = slice(None, None, -1 if turned else 1)
-        self._first, self._second = (group.from_local, group.to_local)[self._order]
-        self._homes = homes[self._order]
-        self._built = (group.from_index, group.to_index)[self._order]
-        self._chosen = spread(len(self._first), len(self._second), count)
+        self._law, self._kind, self.pair = law, int(block[KIND]), int(block[PAIR])
+        self._first, self._second = (group.from_local, group.to_local)[self.order]
         self._far = float(np.sqrt((self._second**2).sum(axis=1).max()))
 
-    def prices(self, asked: Asked, i: IndexArray, j: IndexArray) -> FloatArray:
-        """The derivatives (K,) by alpha of members from points P (K,) to points Q (K,)."""
-        return self._prices(asked, *(i, j)[self._order])[0]
-
-    def go_through(self, asked: Asked, worth: float, most: int) -> Passed:
-        """A pass over all of them; most: how many are told.
-
-        worth: of a unit of cost, the multipliers of volume rows.
-        """
-        tiles = self._tiles(asked, worth)
-        best = tiles[:, BEST]
-        chosen = np.argsort(-best, kind="stable")[:TILES]
-        a, b, rank, gain = (np.concatenate(each) for each in zip(
-            *(self._of_tile(asked, int(tile), worth) for tile in chosen), strict=True
-        ))  # fmt: skip
-        # of every tile some before more of any: neighbours are alike
-        order = np.lexsort((-gain, rank // SHARE))[:most]
-        order = order[np.argsort(-gain[order], kind="stable")]
-        i, j = (self._chosen[0][a[order]], self._chosen[1][b[order]])[self._order]
-        seen, together = int(tiles[:, SEEN].sum()), float(tiles[:, TOGETHER].sum())
-        return Passed(seen, max(float(best.max()), 0.0), together, float(tiles[:, RATIO].max()), i, j, gain[order])
-
-    def _tiles(self, asked: Asked, worth: float) -> FloatArray:
+    def tiles(self, asked: Asked, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
         """(T, TILE_NUMBERS): what `price_candidates` keeps of each tile."""
-        law, own = self._law, self._candidates
-        common = np.empty(COMMON)
+        law, common = self._law, self.common(worth)
         common[[K, C, F0]] = law.stiffness, law.damping, law.preload
         common[FREE] = -1.0 if law.free_length is None else law.free_length
-        common[COST] = -1.0 if own.cost is None else own.cost
-        common[BELOW] = np.nextafter(own.shortest, -np.inf) if own.shortest else 0.0
-        common[ABOVE] = np.nextafter(own.longest, np.inf)
-        common[WORTH], common[UPPER] = worth, self._upper
-        rows, columns = self._chosen
+        rows, columns = self.chosen
         first, second = _padded(self._first[rows], TALL), _padded(self._second[columns], BROAD)
-        homes = _padded(self._homes[0][rows], TALL), _padded(self._homes[1][columns], BROAD)
-        shape = first.shape[1] // TALL, second.shape[1] // BROAD
-        a, b = self._built_here()
-        tile = a // TALL * shape[1] + b // BROAD
-        order = np.argsort(tile, kind="stable")
-        begin = np.searchsorted(tile[order], np.arange(shape[0] * shape[1] + 1)).astype(np.int64)
-        places = (a % TALL * BROAD + b % BROAD)[order].astype(np.int64)
-        out = np.empty((*shape, TILE_NUMBERS))
+        homes = _padded(self.homes[0][rows], TALL), _padded(self.homes[1][columns], BROAD)
+        out = np.empty((*self.shape, TILE_NUMBERS))
         pose, change, weight = asked.of_pair(self.pair)
         kernels.price_candidates(
-            first, second, *homes, common, self._kind, pose, change, weight, begin, places, allowed(), out
+            first, second, *homes, common, self._kind, pose, change, weight, *built, allowed(), out
         )
         return out.reshape(-1, TILE_NUMBERS)
 
-    def _built_here(self) -> tuple[IndexArray, IndexArray]:
-        """The members whose points are among those that are looked at, by the places of these there."""
-        found = [np.searchsorted(chosen, index) for chosen, index in zip(self._chosen, self._built, strict=True)]
-        inside = np.ones(len(self._built[0]), dtype=np.bool_)
-        for place, chosen, index in zip(found, self._chosen, self._built, strict=True):
-            inside &= chosen[np.minimum(place, len(chosen) - 1)] == index
-        return found[0][inside], found[1][inside]
-
-    def _of_tile(self, asked: Asked, tile: int, worth: float) -> tuple[IndexArray, IndexArray, IndexArray, FloatArray]:
-        """Of all candidates of a tile that may enter: the places of their points among those that are looked at, their
-        ranks in the tile, and their gains."""
-        rows, columns = self._chosen
-        width = len(columns)
-        across = -(-width // BROAD)
-        row, column = tile // across * TALL, tile % across * BROAD
-        own_a = np.arange(row, min(row + TALL, len(rows)))
-        own_b = np.arange(column, min(column + BROAD, width))
-        a, b = np.repeat(own_a, len(own_b)), np.tile(own_b, len(own_a))
-        there = self._built_here()
-        new = ~np.isin(a * width + b, there[0] * width + there[1])
-        length = lengths_between(self._homes[0][rows[a]], self._homes[1][columns[b]])
-        new &= (length >= self._candidates.shortest) & (length <= self._candidates.longest) & (length > 0.0)
-        a, b = a[new], b[new]
-        price, length = self._prices(asked, rows[a], columns[b])
-        cost = length if self._candidates.cost is None else self._candidates.cost
-        gain = -self._upper * (price + worth * cost)
-        rank = np.empty(len(gain), dtype=np.intp)
-        rank[np.argsort(-gain, kind="stable")] = np.arange(len(gain))
-        return a, b, rank, gain
-
-    def _prices(self, asked: Asked, a: IndexArray, b: IndexArray) -> tuple[FloatArray, FloatArray]:
-        """The derivatives (K,) by alpha of members from first points to second ones, and their initial lengths."""
+    def prices_between(self, asked: Asked, a: IndexArray, b: IndexArray) -> FloatArray:
+        """The derivatives (K,) by alpha of members from first points to second ones."""
         law, own = self._law, asked.of_pair(self.pair)
-        found, lengths = np.empty(len(a)), lengths_between(self._homes[0][a], self._homes[1][b])
+        found, lengths = np.empty(len(a)), lengths_between(self.homes[0][a], self.homes[1][b])
         for start in range(0, len(a), AT_ONCE):
             part = slice(start, start + AT_ONCE)
             count, length = len(a[part]), lengths[part]
@@ -252,7 +140,7 @@ class SpringCandidates:
             near = np.array([[far**2, min(far / max(self._far, 1e-300), 1.0) ** 2]])
             kernels.price_members(member, self._kind, near, *own, out)
             found[part] = out[:count]
-        return found, lengths
+        return found
 
 
 def _padded(points: FloatArray, multiple: int) -> FloatArray:

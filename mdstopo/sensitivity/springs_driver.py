@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.case.model import Case
+from mdstopo.case.model import Case, MemberGroup
 from mdstopo.integrators.driver import Driver
 from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
@@ -18,7 +18,7 @@ from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.general.settle import Settled
-    from mdstopo.sensitivity.pricing import Asked
+    from mdstopo.sensitivity.pricing import Asked, SpringCandidates
 
 
 class SpringsDriver(Driver):
@@ -100,4 +100,13 @@ def _scenes(case: Case) -> Mapping[str, Scene]:
     return {load_case.name: compile_scene(case, load_case, shared) for load_case in case.load_cases}
 
 
-SPRINGS = SceneFamily(_scenes, SpringsDriver)
+def _candidates(
+    scenes: Mapping[str, Scene], place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None
+) -> "SpringCandidates":
+    """The candidates of a priced group; all load cases have the same."""
+    from mdstopo.sensitivity.pricing import SpringCandidates
+
+    return SpringCandidates(group, next(iter(scenes.values())).model.block[place], homes, count)
+
+
+SPRINGS = SceneFamily(_scenes, SpringsDriver, _candidates)

@@ -11,6 +11,7 @@ from mdstopo.design_problem import sign_of
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
 from mdstopo.plan.front_plan import NoEndError, Planner, Request, Starts
+from mdstopo.plan.priced_designs import packed
 from mdstopo.plan.solve_task import Found, Result, Task, front_key, solve
 from mdstopo.plan.stored_tasks import begun_part, tasks_part
 from mdstopo.starts.callbacks import ignore
@@ -76,8 +77,8 @@ class Combining:
             return Scalarisation(combine.method, weights, signs * self.utopia, signs * self.maxima, combine.exponent)
         active = tuple(np.flatnonzero(weights > 0.0).tolist())
         request = Request(
-            np.zeros((0, len(weights))), combine.method, combine.exponent, True, signs, Starts(first),
-            case.optimizer.max_iterations, active,
+            np.zeros((0, len(weights))), combine.method, combine.exponent, True, signs,
+            Starts(packed(case, first) if case.priced_groups else first), case.optimizer.max_iterations, active,
         )  # fmt: skip
         planner = Planner(request)
         rounds = planner.ends_alone()

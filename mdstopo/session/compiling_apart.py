@@ -21,9 +21,9 @@ from mdstopo.compiler.store import cache_folder, is_kept
 from mdstopo.evaluators import evaluator_of
 from mdstopo.optimizer.wide import MANY
 from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.plan.pricing import price
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
-from mdstopo.session.pricing import price
 from mdstopo.starts.evaluator_interface import even, problem_of
 from mdstopo.starts.getting_ready import FEW, get_ready, meet
 from mdstopo.warm import compiling, tiny
@@ -128,7 +128,7 @@ def _compile_all(case: Case) -> None:
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(case.space.expand(begin), gradient=True)
     if case.priced_groups:
-        price(case, engine, begin, FEW_CANDIDATES)
+        price(case, engine, problem_of(engine, even(case)), begin, FEW_CANDIDATES)
     with contextlib.suppress(OSError):  # a full disk
         _marker(case).touch()
 

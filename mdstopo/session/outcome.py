@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.optimizer.state import State
+from mdstopo.plan.pricing import Pricing
 from mdstopo.session.start_in_stages import iterations_of
 from mdstopo.shown import counted, html_of
 from mdstopo.status import RunStatus
@@ -55,21 +56,6 @@ class Progress:
             change=float(history.change[-1]),
             evaluations=int(state.evaluations),
         )
-
-
-@dataclass(frozen=True, slots=True)
-class Pricing:
-    """What the last round has found of candidates that are priced.
-
-    candidates: how many there are. rounds: so far. best: by how much one of them would lower the objective (or raise
-    it, where it is maximised) with alpha at its upper bound, together: by how much all of them at most; relative to the
-    objective, and to first order. NaN before the first round has ended.
-    """
-
-    candidates: int
-    rounds: int
-    best: float
-    together: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +122,7 @@ class Outcome:
     integrator_reason: str
     conclusion: "Conclusion | None" = None
     variables: Mapping[str, Floats] = field(default_factory=dict)
-    pricing: "Pricing | None" = None
+    pricing: Pricing | None = None
     sizes: "ChosenSizes | None" = None
 
     def __repr__(self) -> str:

@@ -18,13 +18,13 @@ from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
+from mdstopo.plan.pricing_rounds import Rounds
 from mdstopo.plan.stored_tasks import read_begun, read_tasks
 from mdstopo.session.advice import advise, without_slope
 from mdstopo.session.coarse_steps import coarse_steps
 from mdstopo.session.combining import Combining
 from mdstopo.session.compiling_apart import compile_apart
 from mdstopo.session.outcome import Outcome, Progress
-from mdstopo.session.pricing_rounds import Rounds
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
 from mdstopo.session.sizes import Sizes, excess_at_prices
@@ -208,24 +208,25 @@ class _Run:
             for kind in kinds(engine):
                 compile_apart(kind, self.notify)
             workers = spread(engine, self.case, workers, self.helpers, self.notify)
-        problem = problem_of(engine, even(self.case))
-        first = None if self.rounds.count else self.initial
-        stated, begin, self.before = get_ready(self.case, engine, problem, first)
+        # a run that goes on in a later round begins where it once began, with other members
+        started = make(self.stated) if self.rounds.count else engine
+        problem = problem_of(started, even(self.stated))
+        stated, begin, self.before = get_ready(self.stated, started, problem, self.initial)
         self.compare(stated, begin)
         compiled = time.perf_counter()
         if path is not None:
             self.open(path, engine)
         opened = time.perf_counter()
-        scalarisation = self.combine(engine, begin, path)
-        if scalarisation is not None:
+        scalarisation = self.combine(started, begin, path)
+        if scalarisation is not None or started is not engine:
             problem = problem_of(engine, scalarisation)
         with self.saved_without_worker(path):
             self.iterate(make, self.marked(problem), path, workers, scalarisation)
-            while self.case.priced_groups and self.has_ended and self.price(engine):
+            while self.case.priced_groups and self.has_ended and self.price(engine, problem):
                 engine = make(self.case)
-                problem = self.marked(engine.problem())
-                self.open_round(problem)
-                self.iterate(make, problem, path, workers, None)
+                problem = problem_of(engine, scalarisation)
+                self.open_round(self.marked(problem))
+                self.iterate(make, self.marked(problem), path, workers, scalarisation)
             self.choose_sizes(problem, path)
         ended = time.perf_counter()
         best = best_of(self.case, self.states)
@@ -265,20 +266,23 @@ class _Run:
         """The problem, which says which round of pricing it is of, if it is of one."""
         return Marked(problem, ROUND, self.rounds.count) if self.case.priced_groups else problem
 
-    def price(self, engine: Engine) -> bool:
+    def price(self, engine: Engine, problem: Problem) -> bool:
         """Price all candidates at the optimum of the members; whether some of them enter, which then are built."""
-        state = self.states[0]
+        best = best_of(self.case, self.states)
+        state = None if best is None else self.states[best]
         if state is None or self.stop_requested():
             self.has_ended = False
             return False
         self.notify(f"round {self.rounds.count + 1}: pricing {count_text(self.rounds.candidates)} candidates")
-        goes_on = self.rounds.go_on(engine, state)
+        goes_on = self.rounds.go_on(engine, problem, state)
         self.case = self.rounds.case
         return goes_on
 
     def open_round(self, problem: Problem) -> None:
-        """Go on with the members that a round of pricing has built, from the design before."""
-        before = self.states[0]
+        """Go on with the members that a round of pricing has built, from the best design before: other starts have
+        shown where that is, and end here."""
+        best = best_of(self.case, self.states)
+        before = None if best is None else self.states[best]
         assert before is not None
         if hasattr(self, "fixed"):
             self.fixed |= self.members_part()
@@ -329,10 +333,10 @@ class _Run:
             self.initial = np.asarray(before, dtype=np.float64)
         starts, earlier = self.case.optimizer.starts, int(view.settings.get("starts", 1))
         known = restore(view, starts)
-        self.states = carried_over(self.case, known, earlier)
+        self.states = known[:1] if self.rounds.count else carried_over(self.case, known, earlier)
         best = best_of(self.case, self.states)
         self.sizes.restore(view, None if best is None else self.states[best])
-        again = [str(k + 1) for k in range(starts) if known[k] is not None and self.states[k] is None]
+        again = [str(k + 1) for k, each in enumerate(self.states) if known[k] is not None and each is None]
         if again:
             self.notify(
                 f"{view.path} had {earlier} as the number of starts: with {starts} it is decided anew who goes on, "
@@ -388,7 +392,7 @@ class _Run:
 
         def keep(index: int, state: State) -> None:
             self.states[index] = state
-            self.on_iteration(Progress.of(state, index, chosen.starts, most))
+            self.on_iteration(Progress.of(state, index, len(self.states), most))
             if saver is not None:
                 saver.offer()
 

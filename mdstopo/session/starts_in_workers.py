@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
-from mdstopo.session.start_in_stages import run_stages
+from mdstopo.session.start_in_stages import ROUND, Marked, run_stages
 from mdstopo.starts.evaluator_interface import MakeEngine, even, problem_of
 from mdstopo.starts.getting_ready import get_ready
 from mdstopo.starts.single_start import StartTask
@@ -32,6 +32,8 @@ def open_starts(job: Job) -> Perform:
     engine = make_engine(case)
     get_ready(case, engine, problem_of(engine, even(case)), initial)
     problem = problem_of(engine, scalarisation)
+    if case.priced_groups:  # several starts are of the first round
+        problem = Marked(problem, ROUND, 0)
 
     def perform(asked: tuple[StartTask, Arrays | None], parent: Parent) -> Arrays | None:
         task, arrays = asked

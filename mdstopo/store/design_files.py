@@ -28,7 +28,7 @@ def read_design(path: Path | str, count: int, parts: Mapping[str, slice] | None 
     StoreError
         if the file cannot be read, does not hold `count` numbers, or holds negative or non-finite ones.
     """
-    path, point = _place(str(path))
+    path, point = place_of(str(path))
     if path.suffix.lower() in (".h5", ".hdf5"):
         view = read_result(path, leave_out=_NOT_NEEDED)
         alpha = _checked(path, _read_h5(view) if point is None else _read_front(view, point), count)
@@ -81,7 +81,7 @@ def _finite(path: Path, values: NDArray[np.float64], what: str) -> NDArray[np.fl
     return values
 
 
-def _place(text: str) -> tuple[Path, int | None]:
+def place_of(text: str) -> tuple[Path, int | None]:
     """`front.h5:3` is point 3 of a front."""
     found = re.fullmatch(r"(.+\.(?:h5|hdf5)):(\d+)", text, re.IGNORECASE)
     if found is None or Path(text).exists():

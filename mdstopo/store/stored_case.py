@@ -22,7 +22,7 @@ def case_of(view: ResultView, changes: Mapping[str, str] | None = None) -> Case:
     settings = view.settings.items()
     overrides = {key.removeprefix("set "): str(value) for key, value in settings if key.startswith("set ")}
     case = read_case(view.case_text, path=path, overrides=overrides | dict(changes or {}))
-    return built_case(view, case) if view.kind == "run" else case
+    return built_case(view, case) if view.kind in ("run", "pareto") else case
 
 
 def built_case(view: ResultView, case: Case) -> Case:

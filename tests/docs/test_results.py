@@ -110,6 +110,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "run staged.yaml",
         "run sold.yaml",
         "run priced.yaml",
+        "sweep set priced.yaml members.ties.law.stiffness=8,9",
         "gradient varied.yaml --history --differences",
         "pareto varied.yaml --points 4 --starts 1",
         "sweep set varied.yaml members.spring.law.stiffness=8,9 optimizer.starts=1",

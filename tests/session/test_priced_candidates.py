@@ -15,10 +15,11 @@ from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
+from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.plan import pricing
+from mdstopo.plan.pricing_rounds import COLUMNS
 from mdstopo.scene.refusals import refusals
-from mdstopo.session import pricing
 from mdstopo.session.outcome import Outcome
-from mdstopo.session.pricing_rounds import COLUMNS
 from mdstopo.session.run_session import run_session
 from mdstopo.status import RunStatus
 from mdstopo.store.result_reader import read_result
@@ -115,7 +116,7 @@ def test_gains_foretell_what_a_little_of_a_candidate_changes(few: None) -> None:
     case = case_from(engine())
     evaluator = Evaluator(case)
     x = np.full(case.n_design, 0.25)
-    found = pricing.price(case, evaluator, x)
+    found = pricing.price(case, evaluator, evaluator.problem(), x)
     assert found is not None
     i, j = (each[:1] for each in found.pairs["struts"])
     (group,) = case.members
@@ -185,17 +186,132 @@ def test_commands_take_the_file_of_a_run(few: None, tmp_path: Path, capsys: pyte
     assert told["pricing"]["best"] <= 1e-6
 
 
+def jointed(candidates: str = "priced") -> dict[str, Any]:
+    """The same on a hinge, its swing and the pull of its stay limited."""
+    scene = stiff(candidates)
+    scene["joints"] = [{"type": "revolute", "bodies": ["ground", "engine"], "at": [0.1, 0.2]}]
+    scene["members"]["stay"] = {
+        "from": {"body": "engine", "at": [0.25, -0.25]}, "to": {"body": "ground", "at": [0.5, -0.8]},
+        "law": {"type": "spring", "stiffness": 20000}, "design": False,
+    }  # fmt: skip
+    swing = {"angle": {"body": "engine"}}
+    scene["objectives"] = {"G": {"response": swing, "over_time": "rms"}}
+    scene["constraints"] = [
+        {"volume": "all", "limit": 12},
+        {"response": {"member_force": {"group": "stay"}}, "over_time": "max", "limit": 30},
+    ]
+    return scene
+
+
+def two_objectives(candidates: str = "priced") -> dict[str, Any]:
+    """The same on stiff struts, pushed in one load case, and turned in another."""
+    scene = stiff(candidates)
+    (load,) = scene.pop("loads")
+    scene["load_cases"] = {
+        "push": {"loads": [{"body": "engine", "force": load["force"]}]},
+        "turn": {"loads": [{"body": "engine", "moment": load["moment"]}]},
+    }
+    energy = {"response": "energy", "over_time": "mean"}
+    scene["objectives"] = {"P": {**energy, "load_case": "push"}, "T": {**energy, "load_case": "turn"}}
+    return scene | {"combine": {"weights": {"P": 1, "T": 2}}}
+
+
+def uncertain(candidates: str = "priced") -> dict[str, Any]:
+    """The same on stiff struts whose stiffness is uncertain, as the load's point of attack is."""
+    parameters = {
+        "members.struts.law.stiffness": {"uniform": {"from": 15000, "to": 25000}},
+        "loads[0].at[0]": {"uniform": {"from": -0.1, "to": 0.1}},
+    }
+    scene = stiff(candidates)
+    scene["loads"][0]["at"] = [0.01, 0]
+    return scene | {
+        "uncertainty": {
+            "parameters": parameters, "sample": 4, "validation": 0,
+            "objectives": {"G": {"measure": "mean_deviation", "factor": 1}},
+        },
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("scene", [jointed, uncertain], ids=lambda scene: scene.__name__)
+def test_the_optimum_is_that_of_all_candidates_whatever_the_case(scene: Any, few: None) -> None:
+    priced, whole = run_session(case_from(scene())), run_session(case_from(scene("enumerated")))
+    assert priced.status is whole.status is RunStatus.CONVERGED, (priced.reason, whole.reason)
+    assert priced.pricing is not None
+    assert priced.pricing.rounds > 1
+    assert priced.case.n_design < 250
+    assert abs(priced.objectives["G"] / whole.objectives["G"] - 1.0) <= 1e-6
+    assert "no one of 640 candidates would lower G by more than 1e-06 of it" in priced.reason
+
+
+def largest_gain(outcome: Outcome, whole: Case) -> float:
+    """The largest gain of a candidate that is not built, relative to U, from the gradient of all of them."""
+    built = Evaluator(outcome.case)
+    scalarisation = None
+    if outcome.case.combine is not None:
+        weights = [outcome.case.combine.weights[each.name] for each in outcome.case.objectives]
+        scalarisation = Scalarisation("weighted_sum", np.array(weights))
+    problem = built.problem(scalarisation)
+    found = pricing.price(outcome.case, built, problem, outcome.alpha)
+    assert found is not None
+    group, every = outcome.case.members[0], whole.members[0]
+    places = group.from_index * len(every.to_local) + group.to_index
+    x = np.zeros(whole.n_design)
+    x[places] = outcome.alpha
+    other = Evaluator(whole).problem(scalarisation)
+    sample = other.evaluate(x)
+    slopes = pricing.slopes_with(found, pricing.gradients_of(sample), places) + found.linear @ other.linear.A
+    return float((-slopes[x == 0.0]).max() / abs(sample.objective))
+
+
+def test_where_the_result_says_that_no_candidate_gains_none_does(few: None) -> None:
+    weights = {"method": "weighted_sum", "weights": {"P": 1, "T": 2}, "normalize": False}
+    scene = two_objectives() | {"combine": weights}
+    outcome = run_session(case_from(scene))
+    assert outcome.status is RunStatus.CONVERGED
+    assert "no one of 640 candidates would lower U by more than 1e-06 of it" in outcome.reason
+    assert largest_gain(outcome, case_from(scene | {"members": stiff("enumerated")["members"]})) <= 1.01e-6
+
+
+def test_where_none_of_members_with_slack_gains_none_does(few: None) -> None:
+    scene = stiff()
+    scene["members"]["struts"]["law"] = {"type": "gap", "stiffness": 20000, "gap": 0.0005}
+    for k, at in enumerate(([-1, 0.1], [1, 0.3], [0.1, -1])):
+        scene["members"][f"stay{k}"] = {
+            "from": {"body": "engine", "at": [0.2 * at[0], 0.2]}, "to": {"body": "ground", "at": at},
+            "law": {"type": "spring", "stiffness": 3000, "damping": 20}, "design": False,
+        }  # fmt: skip
+    scene["objectives"] = {"G": {"response": {"displacement": {"body": "engine"}}, "over_time": "max"}}
+    outcome = run_session(case_from(scene))
+    assert outcome.status is RunStatus.CONVERGED
+    assert "no one of 640 candidates would lower G by more than 1e-06 of it" in outcome.reason
+    scene["members"]["struts"]["candidates"] = "enumerated"
+    assert largest_gain(outcome, case_from(scene)) <= 1.01e-6
+
+
+def test_several_starts_go_on_from_the_best_of_them(few: None, tmp_path: Path) -> None:
+    material = [{"volume": "all", "equals": 40}]
+    case = case_from(engine(optimizer={"starts": 3}, constraints=material))
+    several = run_session(case, path=tmp_path / "straight.h5")
+    assert several.pricing is not None
+    assert several.pricing.rounds > 1
+    assert several.pricing.best <= 1e-6
+    for after in (2, several.iterations - 3):
+        path = tmp_path / f"resumed{after}.h5"
+        assert run_session(case, path=path, stop_requested=stop_after(after)).status is RunStatus.INTERRUPTED
+        assert run_session(case, path=path, resume=True).reason == several.reason
+        assert_same_files(tmp_path / "straight.h5", path)
+
+
 REFUSED = [
     ({"design": {"initial": 0.1}}, "design.lower", "found 0.001 for 'struts', allowed is 0"),
     ({"design": {"lower": 0, "power": 2}}, "design.power", "found 2 for 'struts', allowed is 1"),
     ({"design": {"lower": 0, "shared": ["struts"]}}, "members.struts.candidates", "design.shared"),
-    ({"optimizer": {"starts": 3}}, "members.struts.candidates", "one start, not 3"),
     ({"solver": {"sensitivity": "direct"}}, "members.struts.candidates", "adjoint, not direct"),
-    ({"solver": {"settle": True}}, "members.struts.candidates", "not for static settling"),
+    ({"solver": {"settle": True}}, "members.struts.candidates", "static settling"),
     (
-        {"objectives": {"G": {"response": "energy"}, "H": {"response": "energy", "over_time": "min"}},
-         "combine": {"weights": {"G": 1, "H": 1}}},
-        "members.struts.candidates", "several objectives",
+        {"solver": {"integrator": "gauss"},
+         "uncertainty": {"parameters": {"bodies.engine.mass": {"uniform": {"from": 9, "to": 11}}}, "sample": 2}},
+        "solver.integrator", "gauss does not compute priced candidates of an uncertain case; runge_kutta does",
     ),
 ]  # fmt: skip
 

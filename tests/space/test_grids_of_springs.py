@@ -162,3 +162,19 @@ def test_a_case_has_the_same_values_and_gradients_without_the_kernels_for_grids(
         assert with_rows.gradients[name] == pytest.approx(
             without.gradients[name], rel=1e-9, abs=1e-9 * np.abs(without.gradients[name]).max()
         )
+
+
+@pytest.mark.parametrize("ends", ["from: low, to: posts", "from: posts, to: low"])
+def test_springs_to_a_grid_on_the_ground_are_those_of_another_law(ends: str) -> None:
+    grid = "{plane: {corner: [-2, -2, -1], edges: [[4, 0, 0], [0, 4, 0]], count: [6, 3]}}"
+    added = f"  posts: {{body: ground, grid: {grid}}}\nmembers:\n  stays: {{{ends}, law: STAY}}\n"
+    text = CASE.replace("DAMPING", "damping: 2").replace("members:\n", added)
+    springs, others = (
+        evaluated(text.replace("STAY", law))
+        for law in ("{type: spring, stiffness: 30}", "{type: cubic, stiffness: 30, cubic: 0}")
+    )
+    for name, value in others.objectives.items():
+        assert springs.objectives[name] == pytest.approx(value, rel=1e-9)
+        assert springs.gradients[name] == pytest.approx(
+            others.gradients[name], rel=1e-8, abs=1e-8 * np.abs(others.gradients[name]).max()
+        )

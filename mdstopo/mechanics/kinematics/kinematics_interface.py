@@ -65,6 +65,11 @@ class Kinematics:
         return found
 
     @property
+    def pose_size(self) -> int:
+        """`pose_size` in Python."""
+        return int(self.kernels["pose_size"].py_func(None))
+
+    @property
     def load_slopes(self) -> int:
         """`load_slopes` in Python."""
         return int(self.kernels["load_slopes"].py_func(None))

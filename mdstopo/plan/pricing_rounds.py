@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from mdstopo.case.candidates import Pairs, pairs_of, with_members
 from mdstopo.case.model import Case
 from mdstopo.case.words import count_text
+from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.state import State
-from mdstopo.session.outcome import Pricing
-from mdstopo.session.pricing import Prices, price
+from mdstopo.plan.pricing import Prices, Pricing, confirmed, price
 from mdstopo.starts.evaluator_interface import Engine
 from mdstopo.status import RunStatus
 from mdstopo.store.contents import CANDIDATES, Datasets
@@ -28,11 +28,22 @@ MOST_ROUNDS = 200
 WORTH_A_ROUND = 0.1
 #: rounds in a row that lower it by less, after which the run ends: what gains to first order does not in fact
 PATIENCE = 3
+#: the largest gain, in tolerances, from which on prices of laws that switch are confirmed with members that are built
+CLOSE = 10.0
 #: columns of the table of rounds in the file
 COLUMNS = ("members", "entered", "left", "objective", "best", "together", "residual", "level")
 #: candidates that the first rounds price, of each group and evenly spread: where an optimum moves far it does so in few
 #: rounds. By how many times more it is once none of these gains much, and up to how much, in tolerances
 COARSE, FINER, LITTLE = 20_000, 32, 100.0
+
+
+def members_part(case: Case) -> Datasets:
+    """What a file keeps of the members that priced groups have."""
+    part: Datasets = {}
+    for name, (i, j) in pairs_of(case).items():
+        where = f"{CANDIDATES}/members/{name}"
+        part |= {f"{where}/from": i.astype(np.int64), f"{where}/to": j.astype(np.int64)}
+    return part
 
 
 class Rounds:
@@ -60,8 +71,11 @@ class Rounds:
         best, together = self.rows[-1][4:6] if self.rows else (np.nan, np.nan)
         return Pricing(self.candidates, self.count, best, together)
 
-    def go_on(self, engine: Engine, state: State) -> bool:
-        """Price all candidates at the end of a round; whether another follows, with those that enter."""
+    def go_on(self, engine: Engine, problem: Problem, state: State) -> bool:
+        """Price all candidates at the end of a round; whether another follows, with those that enter.
+
+        engine, problem, state: of the case so far, of what was optimised, and where that has ended.
+        """
         before = self.rows[-1][3] if self.rows else np.inf
         tolerance = self.case.optimizer.tolerance
         fallen = before - state.best_objective
@@ -69,7 +83,7 @@ class Rounds:
         little = LITTLE * tolerance
         while True:
             count = self._count_of(level)
-            found = self.last = price(self.case, engine, state.best_alpha, count)
+            found = self.last = price(self.case, engine, problem, state.best_alpha, count)
             if found is None:
                 self._ended = True
                 return False
@@ -78,6 +92,8 @@ class Rounds:
             level += 1
         if count is None:
             self.candidates = found.seen
+            if self._switches and found.best <= CLOSE * tolerance:
+                found = self.last = confirmed(self.case, problem, state.best_alpha, found)
         pairs, staying = self._entered(found, state, fallen > 0.0)
         entered = sum(len(i) for i, _ in found.pairs.values())
         left = self.case.n_design - int(staying.sum())
@@ -97,6 +113,11 @@ class Rounds:
             self._build(pairs, staying, state.best_alpha)
         return not self._ended
 
+    @property
+    def _switches(self) -> bool:
+        """Whether candidates are priced whose law is not smooth."""
+        return any(not law.is_smooth for group in self.case.priced_groups for law in group.laws)
+
     def _count_of(self, level: int) -> int | None:
         """About how many candidates of each group are priced at a level; None: all."""
         count = COARSE * FINER**level
@@ -107,10 +128,10 @@ class Rounds:
         """The run's status, and what is known of the candidates."""
         if self.last is None or not self._ended:
             return RunStatus.STALLED, f"{state.reason}; the candidates could not be priced"
-        (objective,) = self.case.objectives
-        verb = "lower" if objective.sense == "minimize" else "raise"
+        several, objective = len(self.case.objectives) > 1, self.case.objectives[0]
+        verb = "lower" if several or objective.sense == "minimize" else "raise"
         tolerance, best = self.case.optimizer.tolerance, self.last.best
-        named = f"of {count_text(self.candidates)} candidates would {verb} {objective.name}"
+        named = f"of {count_text(self.candidates)} candidates would {verb} {'U' if several else objective.name}"
         status = state.status
         if best <= tolerance:
             words = f"no one {named} by more than {tolerance:.3g} of it"
@@ -153,10 +174,7 @@ class Rounds:
         """What a file keeps: the points of the members that are built, and the rounds."""
         if not self.case.priced_groups:
             return {}
-        part: Datasets = {}
-        for name, (i, j) in pairs_of(self.case).items():
-            where = f"{CANDIDATES}/members/{name}"
-            part |= {f"{where}/from": i.astype(np.int64), f"{where}/to": j.astype(np.int64)}
+        part = members_part(self.case)
         columns = np.array(self.rows).reshape(-1, len(COLUMNS)).T
         part |= {f"{CANDIDATES}/rounds/{name}": column for name, column in zip(COLUMNS, columns, strict=True)}
         return part | {f"{CANDIDATES}/count": np.array(self.candidates)}

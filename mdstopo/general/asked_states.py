@@ -1,0 +1,337 @@
+"""What a weighted sum of rows and integrals asks of members, whatever they are: states, and what is virtual there.
+
+A member adds to the derivative a sum over states that knows of the motion only the relative pose of its two bodies with
+its rates, the virtual change of that pose, and the weight of the stored energy. These are few numbers: here they are
+written down for some pairs, of a member between which `candidate_prices` then forms the sum, whether it is built or
+not. States are all stages of the motion, then those of each row: the state it is read at, and the stages of the partial
+step that leads there where there is one.
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import entry, kernel, part
+from mdstopo.general.accelerations import make_workspace, solve_accelerations
+from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents, state_of_row, sweep
+from mdstopo.general.model import unpack_general
+from mdstopo.general.permanent_sets import count_sets
+from mdstopo.general.responses import design_slopes, energy_weight
+from mdstopo.general.row_sweep import step_of_rows
+from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    freedoms,
+    pair_displacement,
+    pose_acceleration,
+    pose_size,
+    relative_pose,
+)
+
+#: stages of a step at most (`step_history`), and so states of a row beside those of the motion: one more
+MOST_STAGES = 17
+OF_A_ROW = 1 + MOST_STAGES
+
+
+@entry
+def ask_members(
+    tag,
+    ints,
+    floats,
+    tables,
+    limits,
+    count,
+    which,
+    rows,
+    factor,
+    integrals,
+    share,
+    pairs,
+    room,
+    room_ints,
+    member_state,
+    padded,
+    pose,
+    change,
+    push,
+    energy,
+    when,
+    segment,
+    work,
+):
+    """Write down what a weighted sum of R rows and K integrals asks of members between some pairs of bodies.
+
+    Constant:
+      tag: the method of integration (`method_interface`).
+      ints, floats: the packed scene (`pack_general`).
+      tables: coefficients of the method.
+      limits (6,): sizes of the history of steps (`carve_history`).
+    In:
+      count: number of steps.
+      which (R, 2): number of each row's response, and 0.
+      rows (R, COLUMNS), factor (R,): rows of `extremes`, the latest first, and their weights.
+      integrals (K, 2), share (K,): number of a response, and whether its square is integrated; their weights.
+      pairs (G,): the pairs.
+    In place:
+      room, room_ints: flat arrays of the history of steps (`carve_history`); partial steps are kept behind it.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    Out; all of the states, of which there are the stages and OF_A_ROW for each row, zeros before the call:
+      pose (T, G, POSE), change (T, G, D), push (T, G, D): relative poses, minus their virtual changes, and their second
+        derivatives in time.
+      energy (T,), when (T,), segment (T,): weight of the stored energy; time (s), and the segment of it, which is not
+        touched where there is no state.
+      padded (R or 1, M_padded + P): scratch.
+      work (WORK,): counts of work, added to.
+    """
+    model = unpack_general(ints, floats)
+    history = carve_history(model, limits, room, room_ints)
+    workspace = make_workspace(model)
+    states = pose, push, when, segment
+    for w in range(count):
+        for o in range(history.index[w, FIRST], history.index[w + 1, FIRST]):
+            _keep_stage(model, history, o, history.index[w, SEGMENT], pairs, states, o)
+    if rows.shape[0] > 0:
+        _ask_rows(
+            tag, model, tables, member_state, history, count, which, rows, factor, workspace, pairs, states, change,
+            energy, padded, work,
+        )  # fmt: skip
+    for k in range(integrals.shape[0]):
+        _ask_integral(
+            tag, model, tables, member_state, history, count, integrals[k, 0], integrals[k, 1] != 0, share[k],
+            workspace, pairs, states, change, energy, padded[0], work,
+        )  # fmt: skip
+
+
+@entry
+def keep_states(ints, floats, q, v, a, pairs, pose, push):
+    """Relative poses of pairs at states, and their second derivatives in time.
+
+    In:
+      ints, floats: the packed scene (`pack_general`).
+      q (T, n_q), v, a (T, n): coordinates, velocities, accelerations.
+      pairs (G,): the pairs.
+    Out:
+      pose (T, G, POSE), push (T, G, D): set.
+    """
+    model = unpack_general(ints, floats)
+    states = pose, push, np.empty(q.shape[0]), np.empty(q.shape[0], np.int64)
+    for i in range(q.shape[0]):
+        _keep(model, q[i], v[i], a[i], 0.0, np.int64(0), pairs, states, i)
+
+
+@part
+def _keep_stage(model, history, o, segment, pairs, states, at):
+    """Write down stage o of a segment as state `at`.
+
+    model: the compiled scene.
+    history: the history of steps (`StepHistory`).
+    pairs (G,): the pairs.
+    states: poses, second derivatives, times and segments, as of `ask_members`.
+    """
+    _keep(
+        model, history.stage_q[o], history.stage_v[o], history.stage_a[o], history.when[o], segment, pairs, states, at
+    )  # fmt: skip
+
+
+@kernel
+def _keep(model, q, v, a, t, segment, pairs, states, at):
+    """Write down a state.
+
+    model: the compiled scene.
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    t, segment: time (s), and the segment of it.
+    pairs (G,): the pairs.
+    states: poses, second derivatives, times and segments, as of `ask_members`.
+    at: the number of the state.
+    """
+    pose, push, when, segments = states
+    rel = np.empty((model.pair.shape[0], pose_size(model)))
+    relative_pose(model, q, v, rel)
+    for g in range(pairs.shape[0]):
+        copy_vector(rel[pairs[g]], pose[at, g])
+        pose_acceleration(model, rel, pairs[g], a, push[at, g])
+    when[at] = t
+    segments[at] = segment
+
+
+@kernel
+def _add_change(model, q, v, z, factor, pairs, out):
+    """Subtract the virtual changes of pairs at a state, times a factor.
+
+    model: the compiled scene.
+    q (n_q,), v, z (n,): coordinates, velocities, virtual displacements.
+    factor: of these. pairs (G,): the pairs.
+    out (G, D): added to.
+    """
+    rel = np.empty((model.pair.shape[0], pose_size(model)))
+    u = np.empty(freedoms(model))
+    relative_pose(model, q, v, rel)
+    for g in range(pairs.shape[0]):
+        pair_displacement(model, rel, pairs[g], z, u)
+        for i in range(freedoms(model)):
+            out[g, i] -= factor * u[i]
+
+
+@kernel
+def _ask_rows(
+    tag, model, tables, member_state, history, count, which, rows, factor, workspace, pairs, states, change, energy,
+    padded, work,
+):  # fmt: skip
+    """What rows ask, as `ask_members` has it; `row_sweep.rows_gradients` with what it goes through written down.
+
+    Constant:
+      tag, tables: the integrator (`method_interface`) and its coefficients.
+      model: the compiled scene.
+      count: number of steps.
+    In:
+      which (R, 2), rows (R, COLUMNS), factor (R,): the rows, and their weights.
+      pairs (G,): the pairs.
+    In place:
+      member_state (3, columns): state of the members.
+      history: the history of steps (`StepHistory`); partial steps are kept behind it.
+    Out:
+      states: poses, second derivatives, times and segments. change (T, G, D), energy (T,): added to.
+      workspace: workspace of a balance (`accelerations.Workspace`).
+      padded (R, M_padded + P): scratch. work (WORK,): counts of work, added to.
+    """
+    n = model.mass.shape[0]
+    total = rows.shape[0]
+    stages = history.index[count, FIRST]
+    bars = np.empty((3, n))
+    bar_set = np.zeros((total, count_sets(model)))
+    lam_q = np.zeros((total, n))
+    lam_v = np.zeros((total, n))
+    lam_x = np.zeros((total, 2, n))
+    begins = np.empty(total, np.int64)
+    fraction = np.ones(total)
+    z = np.empty((total, MOST_STAGES, n))
+    y = np.empty(model.size[0])
+    weighed = np.empty(n)
+    for m in range(total):
+        w, fraction[m] = row_cotangents(
+            tag, model, tables, member_state, history, count, which[m, 0], rows[m], np.bool_(False), workspace, bars,
+            bar_set[m], padded[m], work,
+        )  # fmt: skip
+        lam_q[m] = bars[0]
+        lam_v[m] = bars[1]
+        at = stages + OF_A_ROW * m
+        energy[at] = factor[m] * _keep_row(
+            tag, model, tables, member_state, history, count, which[m, 0], rows[m], workspace, pairs, states, at,
+            bars[2], factor[m], change[at], work,
+        )  # fmt: skip
+        if w > count:
+            own = slice(m, m + 1)
+            first = history.index[w, FIRST]
+            used = history.index[w + 1, FIRST] - first
+            before = step_of_rows(
+                tag, model, tables, member_state, history, count, w, fraction[own], lam_q[own], lam_v[own], lam_x[own],
+                bar_set[own], z[own], y, workspace, padded[own], work,
+            )  # fmt: skip
+            for j in range(used):
+                _keep_stage(model, history, first + j, history.index[w, SEGMENT], pairs, states, at + 1 + j)
+                _add_change(
+                    model, history.stage_q[first + j], history.stage_v[first + j], z[m, j], factor[m], pairs,
+                    change[at + 1 + j],
+                )  # fmt: skip
+            w = before
+        begins[m] = w
+    w = begins[0]
+    active = 0
+    while w >= 0:
+        while active < total and begins[active] >= w:
+            active += 1
+        first = history.index[w, FIRST]
+        used = history.index[w + 1, FIRST] - first
+        before = step_of_rows(
+            tag, model, tables, member_state, history, count, w, fraction[:active], lam_q[:active], lam_v[:active],
+            lam_x[:active], bar_set[:active], z[:active], y, workspace, padded[:active], work,
+        )  # fmt: skip
+        for j in range(used):
+            weighed[:] = 0.0
+            for m in range(active):
+                for d in range(n):
+                    weighed[d] += factor[m] * z[m, j, d]
+            _add_change(
+                model, history.stage_q[first + j], history.stage_v[first + j], weighed, 1.0, pairs, change[first + j]
+            )
+        w = before
+
+
+@kernel
+def _keep_row(
+    tag, model, tables, member_state, history, count, j, row, workspace, pairs, states, at, z, factor, change, work
+):
+    """Write down the state that a row is read at; returns the weight of the stored energy there.
+
+    Constant:
+      tag, tables: the integrator (`method_interface`) and its coefficients.
+      model: the compiled scene.
+      count: number of steps.
+    In:
+      j, row (COLUMNS,): the response, and the row.
+      pairs (G,): the pairs.
+      at: the number of the state.
+      z (n,), factor: virtual displacements there, and their factor.
+    In place:
+      member_state (3, columns): state of the members.
+      history: the history of steps (`StepHistory`); a partial step is kept behind it.
+    Out:
+      states: poses, second derivatives, times and segments, as of `ask_members`.
+      change (G, D): added to.
+      workspace: workspace of a balance (`accelerations.Workspace`).
+      work (WORK,): counts of work, added to.
+    """
+    n = model.mass.shape[0]
+    q = np.empty(model.q0.shape[0])
+    v = np.empty(n)
+    a = np.empty(n)
+    lam = np.empty(model.size[0])
+    k = int(row[2])
+    segment = history.index[k, SEGMENT]
+    state_of_row(tag, model, tables, member_state, history, count, row, workspace, q, v, work)
+    t = history.t[k] + row[3] * (history.t[k + 1] - history.t[k])
+    restore_modes(history, history.index[k, EVENTS], member_state)
+    solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
+    _keep(model, q, v, a, t, segment, pairs, states, at)
+    _add_change(model, q, v, z, factor, pairs, change)
+    slopes = design_slopes(model, member_state, segment, j, int(row[6]), t, q, v, a, lam, workspace)
+    return energy_weight(model, j, slopes)
+
+
+@kernel
+def _ask_integral(
+    tag, model, tables, member_state, history, count, j, square, factor, workspace, pairs, states, change, energy,
+    scratch, work,
+):  # fmt: skip
+    """What an integral asks, as `ask_members` has it.
+
+    Constant:
+      tag, tables: the integrator (`method_interface`) and its coefficients.
+      model: the compiled scene.
+      history, count: the history of steps, and how many steps it has.
+    In:
+      j, square, factor: the response; whether its square is integrated; the weight.
+      pairs (G,): the pairs.
+    In place:
+      member_state (3, columns): state of the members.
+    Out:
+      states: not touched. change (T, G, D), energy (T,): added to.
+      workspace: workspace of a balance (`accelerations.Workspace`).
+      scratch (M_padded + P,). work (WORK,): counts of work, added to.
+    """
+    n = model.mass.shape[0]
+    stages = history.index[count, FIRST]
+    bars = np.zeros((stages, 3, n))
+    rows_bar = np.zeros((stages, model.size[0]))
+    sets_bar = np.zeros((stages, count_sets(model)))
+    energies = np.zeros(stages)
+    virtual = np.zeros((stages, n))
+    integral_cotangents(
+        tag, model, tables, member_state, history, count, j, square, bars, rows_bar, sets_bar, energies, workspace,
+        scratch, work,
+    )  # fmt: skip
+    drops = event_drops(model, member_state, history, count, j, square, workspace)
+    sweep(
+        tag, model, tables, member_state, history, count, count - 1, 1.0, np.zeros(n), np.zeros(n),
+        np.zeros(sets_bar.shape[1]), bars, rows_bar, sets_bar, drops, j, square, workspace, virtual, scratch, work,
+    )  # fmt: skip
+    for o in range(stages):
+        energy[o] += factor * energies[o]
+        _add_change(model, history.stage_q[o], history.stage_v[o], virtual[o], factor, pairs, change[o])

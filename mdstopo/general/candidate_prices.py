@@ -1,0 +1,555 @@
+"""The prices of members that are not built, by any laws, in a plane or in space: the derivative each would have.
+
+What the motion asks of members stands in states (`asked_states`). The members of a group lie between the points of two
+grids; here all of them are gone through, tile by tile, of which a few numbers are kept (as in
+`sensitivity.candidate_prices`), or single ones.
+
+No step ends at a switch of a member of alpha = 0. So one whose law switches is followed through the steps by its
+elongation at some nodes of each. Where it leaves its mode within a step, the sum over stages, which is for smooth
+forces, gives way to an integral over the pieces: there the virtual change is the polynomial with the moments that the
+stages give.
+"""
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from mdstopo.compiler.fields import Field, Fields, views_of
+from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.threads import shared, taken
+from mdstopo.general.members import MODE
+from mdstopo.general.model import INERTER, MEMBER_EXCESS, MEMBER_FREE_LENGTH, unpack_general
+from mdstopo.general.structures import bundle
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    has_spring_energies,
+    member_designs,
+    member_motion,
+    member_work,
+    second_rate,
+    spring_designs,
+    spring_energies,
+)
+from mdstopo.mechanics.laws.table import (
+    SPRING,
+    law,
+    law_first_set,
+    law_margin,
+    law_next,
+    law_remembers,
+    law_set,
+    law_start,
+)
+from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.sensitivity.candidate_prices import BROAD, TALL, sum_tile
+
+#: candidates of a tile, and of a call of `price_places`
+PLACES = TALL * BROAD
+#: columns of `Asked.run`
+SCENE, CODE, FIRST_STATE, FIRST_ENERGY, LAST_STATE, FIRST_STEP, LAST_STEP, FROM_START = range(8)
+#: columns of `Asked.step`, and what a step may be
+FIRST_STAGE, LAST_STAGE, FIRST_NODE, KIND, MOVES = range(5)
+WHOLE, PART, POINT = range(3)
+#: fractions of a step at which a member that switches is looked at (Gauss and Lobatto), and the weights of these in the
+#: polynomial through all
+NODES = 6
+_ROOTS = np.sort(np.polynomial.legendre.Legendre.basis(NODES - 1).deriv().roots())
+NODE = 0.5 + 0.5 * np.concatenate([[-1.0], _ROOTS, [1.0]])
+BARYCENTRIC = np.array([1.0 / np.prod(c - np.delete(NODE, m)) for m, c in enumerate(NODE)])
+#: points and weights of an integral over a piece of a step, as fractions of it (Gauss)
+GAUSS = 0.5 * np.array(np.polynomial.legendre.leggauss(5)) + np.array([[0.5], [0.0]])
+#: what is known of a member at the nodes: elongation, its rate, its second derivative; its part of the virtual change;
+#: the law's tabulated force
+X, RATE, SECOND, ALONG, LEVEL = range(5)
+NODE_ROWS = 5
+#: pieces of a step in which a member stays in a mode: the fraction at which one begins, the mode, the permanent set;
+#: how many changes are followed, and how often an interval with one in it is halved
+BEGIN, PIECE_MODE, PIECE_SET = range(3)
+PIECE = 3
+CHANGES = 4
+HALVINGS = 40
+#: arrays of states in `Asked`, and of steps and nodes
+ARRAYS = (
+    "pose", "change", "push", "energy", "when", "level", "step", "step_time", "node_pose", "node_push", "node_change",
+    "node_level",
+)  # fmt: skip
+#: states of one pass over a tile, whose poses stay in the nearest cache
+AT_ONCE = 32
+
+
+class Asked(NamedTuple):
+    """The candidates of a group, and what the laws of its members are asked for: by scenes, and by runs of states."""
+
+    run: Annotated[
+        IndexArray,
+        Field(
+            "n_run, 8",
+            "of the states that one law of one scene is asked for in: the scene; the law's code; the first state, the "
+            "first one whose energy counts, and the one behind all; of a law that switches the first step, and the one "
+            "behind all; whether it acts from the start",
+        ),
+    ]
+    rest: Annotated[FloatArray, Field("n_run", "the law's free length (m); negative: the length as stated")]
+    law: Annotated[FloatArray, Field("n_run, 8", "its parameters (`mechanics.laws.table`)")]
+    curves: Annotated[FloatArray, Field("n_scene, n_curve", "numbers of the scene's laws")]
+    pose: Annotated[FloatArray, Field("n_state, 1, n_pose", "relative pose of the group's bodies, and its rates")]
+    change: Annotated[FloatArray, Field("n_state, 1, n_free", "minus the virtual change of the pose")]
+    push: Annotated[FloatArray, Field("n_state, n_free", "second derivative of the pose in time")]
+    energy: Annotated[FloatArray, Field("n_state", "weight of the stored energy")]
+    when: Annotated[FloatArray, Field("n_state", "time (s)")]
+    level: Annotated[FloatArray, Field("n_state", "the law's tabulated force (N)")]
+    step: Annotated[
+        IndexArray,
+        Field(
+            "n_step, 5",
+            "of laws that switch, in the order of time: the first stage among the states, and the one behind the last; "
+            "the first node; whether it is a whole step, a part of one, or a state alone; whether anything is virtual",
+        ),
+    ]
+    step_time: Annotated[FloatArray, Field("n_step, 2", "when it begins, and how long it is (s)")]
+    node_pose: Annotated[FloatArray, Field("n_node, n_pose", "relative poses at NODE of each step, and their rates")]
+    node_push: Annotated[FloatArray, Field("n_node, n_free", "their second derivatives")]
+    node_change: Annotated[
+        FloatArray, Field("n_node, n_free", "minus their virtual changes, by the fraction of the step")
+    ]
+    node_level: Annotated[FloatArray, Field("n_node", "the law's tabulated force (N)")]
+    first: Annotated[FloatArray, Field("n_scene, n_axis, n_first", "points of the one grid in their body's frame (m)")]
+    second: Annotated[FloatArray, Field("n_scene, n_axis, n_second", "points of the other grid, likewise")]
+    first_home: Annotated[FloatArray, Field("n_scene, n_axis, n_first", "the points of the one grid at the start (m)")]
+    second_home: Annotated[FloatArray, Field("n_scene, n_axis, n_second", "those of the other grid")]
+    first_stated: Annotated[
+        FloatArray, Field("n_scene, n_axis, n_first", "where the scene's case has the points of the one grid (m)")
+    ]
+    second_stated: Annotated[FloatArray, Field("n_scene, n_axis, n_second", "where it has those of the other grid")]
+    first_place: Annotated[
+        FloatArray, Field("n_axis, n_first", "where they are for what members cost, and which there are (m)")
+    ]
+    second_place: Annotated[FloatArray, Field("n_axis, n_second", "likewise of the other grid")]
+
+
+class AskedView:
+    """An `Asked` inside kernels, made by `unpack_asked`."""
+
+    def __init__(self, *_arrays: Any) -> None: ...
+
+
+FIELDS = Fields(Asked)
+bundle(AskedView, FIELDS.names)
+
+
+@views_of(FIELDS, AskedView, kernel)
+def unpack_asked(ints, floats):
+    """The `Asked` whose arrays are views of the packed ones."""
+
+
+@entry
+def price_places(ints, floats, asked_ints, asked_floats, places, out):
+    """The prices of single members.
+
+    In:
+      ints, floats: a packed scene (`pack_general`) with room for PLACES members and for the longest `curves`.
+      asked_ints, asked_floats: a packed `Asked`.
+      places (2, M): numbers of the points of each member; M at most PLACES.
+    Out:
+      out (M,): derivatives by alpha.
+    """
+    model = unpack_general(ints, floats.copy())
+    index = np.zeros((2, PLACES), np.int64)
+    index[:, : places.shape[1]] = places
+    price = np.empty(PLACES)
+    _price(model, unpack_asked(asked_ints, asked_floats), index, np.int64(0), np.empty(PLACES), price)
+    out[:] = price[: out.shape[0]]
+
+
+@entry
+def price_tiles(ints, floats, asked_ints, asked_floats, common, built, places, threads, out):
+    """Go through every point of the one grid with every point of another.
+
+    In:
+      ints, floats, asked_ints, asked_floats: as of `price_places`.
+      common (COMMON,): what candidates have in common, as of `sensitivity.candidate_prices`.
+      built (T + 1,), places (any,): by tile, where in it candidates are that do not count.
+      threads: that share the work.
+    Out:
+      out (strips, tiles, TILE_NUMBERS): of each tile what is kept of it; strips tiles = T.
+    """
+    counter = np.zeros(1, np.int64)
+    job = (counter, ints, floats, asked_ints, asked_floats, common, built, places, out)
+    shared(_price_strips, threads, job)
+
+
+@kernel
+def _price_strips(counter, ints, floats, asked_ints, asked_floats, common, built, places, out):
+    """Price strip after strip, until none is left: what each thread does.
+
+    In:
+      counter (1,): strips that some thread has taken so far; counted on.
+      ints, floats, asked_ints, asked_floats, common, built, places: as of `price_tiles`.
+    Out:
+      out (strips, tiles, TILE_NUMBERS): as of `price_tiles`.
+    """
+    model = unpack_general(ints, floats.copy())
+    asked = unpack_asked(asked_ints, asked_floats)
+    rows = asked.first.shape[2]
+    columns = asked.second.shape[2]
+    index = np.zeros((2, PLACES), np.int64)
+    price = np.empty(PLACES)
+    length = np.empty(PLACES)
+    i = taken(counter)
+    while i < out.shape[0]:
+        for j in range(out.shape[1]):
+            for a in range(TALL):
+                for b in range(BROAD):
+                    index[0, a * BROAD + b] = min(i * TALL + a, rows - 1)
+                    index[1, a * BROAD + b] = min(j * BROAD + b, columns - 1)
+            _price(model, asked, index, np.int64(BROAD), length, price)
+            for a in range(TALL):
+                for b in range(BROAD):
+                    if i * TALL + a >= rows or j * BROAD + b >= columns:
+                        price[a * BROAD + b] = np.inf
+            tile = i * out.shape[1] + j
+            for at in range(built[tile], built[tile + 1]):
+                price[places[at]] = np.inf
+            sum_tile(price, length, common, out[i, j])
+        i = taken(counter)
+
+
+@kernel
+def _price(model, asked, index, row, length, price):
+    """The prices of PLACES members.
+
+    In:
+      model: with room for them.
+      asked: an `Asked`.
+      index (2, PLACES): numbers of their points.
+      row: how many behind each other begin at one point; 0: they do not.
+    Out:
+      model: its members are overwritten.
+      length (PLACES,): their lengths as stated (m).
+      price (PLACES,): derivatives by alpha.
+    """
+    axes = asked.first.shape[1]
+    member_state = np.zeros((3, PLACES))
+    _lengths(asked.first_place, asked.second_place, index, length)
+    start = np.empty(PLACES)
+    stated = np.empty(PLACES)
+    price[:] = 0.0
+    before = np.int64(-1)
+    for k in range(asked.run.shape[0]):
+        scene = asked.run[k, SCENE]
+        if scene != before:
+            for d in range(axes):
+                for i in range(PLACES):
+                    model.member[d, i] = asked.first[scene, d, index[0, i]]
+                    model.member[axes + d, i] = asked.second[scene, d, index[1, i]]
+            for i in range(asked.curves.shape[1]):
+                model.curves[i] = asked.curves[scene, i]
+            _lengths(asked.first_home[scene], asked.second_home[scene], index, start)
+            _lengths(asked.first_stated[scene], asked.second_stated[scene], index, stated)
+            before = scene
+        for i in range(PLACES):
+            free = stated[i] if asked.rest[k] < 0.0 else asked.rest[k]
+            model.member[MEMBER_FREE_LENGTH, i] = free
+            model.member[MEMBER_EXCESS, i] = (start[i] - free) * (start[i] + free)
+        _price_run(model, asked, k, row, member_state, price)
+
+
+@kernel
+def _lengths(first, second, index, out):
+    """out (PLACES,): distances of points first (d, n_A) from second (d, n_B), by their numbers in index (2, PLACES)."""
+    for i in range(PLACES):
+        square = 0.0
+        for d in range(first.shape[0]):
+            apart = second[d, index[1, i]] - first[d, index[0, i]]
+            square += apart * apart
+        out[i] = math.sqrt(square)
+
+
+@kernel
+def _price_run(model, asked, k, row, member_state, price):
+    """Add what members do by one law in the states of a run.
+
+    In:
+      model: with the members.
+      asked, k: an `Asked`, and the number of the run.
+      row: members behind each other that begin at one point, or 0.
+      member_state (3, PLACES): zeros; no member of a law that does not switch has a mode.
+    Out:
+      price (PLACES,): added to.
+    """
+    pose = asked.pose
+    change = asked.change
+    run = asked.run[k]
+    p = asked.law[k]
+    code = run[CODE]
+    if run[LAST_STEP] > run[FIRST_STEP]:
+        _price_switching(model, asked, k, price)
+        return
+    elastic = code == SPRING and p[1] == 0.0 and p[2] == 0.0
+    begin = run[FIRST_STATE]
+    if elastic:
+        while begin < run[FIRST_ENERGY]:
+            end = min(begin + AT_ONCE, run[FIRST_ENERGY])
+            spring_designs(
+                model, p, np.int64(0), np.int64(PLACES), row, pose[begin:end], change[begin:end], np.int64(0), price
+            )
+            begin = end
+    for s in range(begin, run[LAST_STATE]):
+        weight = asked.energy[s] if s >= run[FIRST_ENERGY] else 0.0
+        if elastic and has_spring_energies(model):
+            spring_energies(model, p, np.int64(0), np.int64(PLACES), pose[s : s + 1], np.int64(0), weight, price)
+        elif code == INERTER:
+            _add_inertial(model, p[0], pose[s, 0], change[s, 0], asked.push[s], price)
+        else:
+            member_designs(
+                model, code, p, np.int64(0), np.int64(PLACES), asked.when[s], asked.level[s], member_state,
+                member_state[MODE], pose[s, 0], change[s, 0], weight, price,
+            )  # fmt: skip
+
+
+@kernel
+def _price_switching(model, asked, k, price):
+    """Add what members of a law that switches do in the steps of a run.
+
+    In:
+      model: with the members.
+      asked, k: an `Asked`, and the number of the run.
+    Out:
+      price (PLACES,): added to.
+    """
+    node = np.empty((NODE_ROWS, NODES))
+    pieces = np.empty((CHANGES + 1, PIECE))
+    for i in range(PLACES):
+        price[i] += _price_followed(model, asked, k, i, node, pieces)
+
+
+@kernel
+def _price_followed(model, asked, k, i, node, pieces):
+    """What member i of a law that switches does in the steps of a run.
+
+    A step in which it stays in its mode counts by its stages, as for a member that is built. In one in which it leaves
+    it, the force of each mode times the member's part of the virtual change is integrated over the mode's piece, both
+    from their values at the nodes.
+
+    In:
+      model: with the members.
+      asked, k, i: an `Asked`, the number of the run, and the member.
+    Scratch:
+      node (NODE_ROWS, NODES), pieces (CHANGES + 1, PIECE).
+    """
+    run = asked.run[k]
+    p = asked.law[k]
+    code = run[CODE]
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    remembers = law_remembers(code)
+    mode = np.int64(0)
+    kept = 0.0
+    begun = run[FROM_START] == 0  # it has not acted, and begins as a member that is built does
+    total = 0.0
+    pieces[0, PIECE_MODE] = 0.0
+    pieces[0, PIECE_SET] = 0.0
+    last = 0
+    for s in range(run[FIRST_STEP], run[LAST_STEP]):
+        step = asked.step[s]
+        if step[KIND] == POINT:
+            o = step[FIRST_STAGE]
+            length, x, rate = member_motion(model, i, asked.pose[o, 0])
+            if not length > 0.0:
+                continue
+            now = int(pieces[last, PIECE_MODE])
+            own = pieces[last, PIECE_SET]
+            if not begun or not remembers:
+                second = second_rate(model, i, asked.pose[o, 0], asked.push[o])
+                now = law_start(code, p, x, rate, second, asked.when[o], model.curves, rest)
+                own = law_first_set(code, p, x, now)
+            worked, stored = _at_state(model, asked, code, p, i, o, now, own)
+            total += worked + stored
+            continue
+        if step[MOVES] == 0 and not remembers:
+            continue
+        _fill_nodes(model, asked, i, step[FIRST_NODE], node)
+        if not begun or not remembers:
+            t = asked.step_time[s, 0]
+            mode = law_start(code, p, node[X, 0], node[RATE, 0], node[SECOND, 0], t, model.curves, rest)
+            kept = law_first_set(code, p, node[X, 0], mode)
+            begun = np.bool_(True)
+        pieces[0, BEGIN] = 0.0
+        pieces[0, PIECE_MODE] = mode
+        pieces[0, PIECE_SET] = kept
+        last = _follow(code, p, model.curves, rest, asked.step_time[s], node, pieces)
+        for o in range(step[FIRST_STAGE], step[LAST_STAGE]):
+            c = (asked.when[o] - asked.step_time[s, 0]) / asked.step_time[s, 1]
+            at = last
+            while at > 0 and pieces[at, BEGIN] > c:
+                at -= 1
+            now = int(pieces[at, PIECE_MODE])
+            worked, stored = _at_state(model, asked, code, p, i, o, now, pieces[at, PIECE_SET])
+            total += stored
+            if last == 0:
+                total += worked
+        if last > 0:
+            for at in range(last + 1):
+                end = pieces[at + 1, BEGIN] if at < last else 1.0
+                total += _over_piece(model, asked, code, p, rest, s, node, pieces[at], end)
+        if step[KIND] == WHOLE:
+            mode = int(pieces[last, PIECE_MODE])
+            kept = pieces[last, PIECE_SET]
+    return total
+
+
+@kernel
+def _at_state(model, asked, code, p, i, o, mode, kept):
+    """What member i does at a state: its force times the virtual change, and its energy times the weight there.
+
+    model: with the members.
+    asked: an `Asked`.
+    code, p (8,): of the law.
+    i, o: numbers of the member and of the state.
+    mode, kept: the mode that the member is in, and its permanent set (m).
+    """
+    length, x, along = member_work(model, i, asked.pose[o, 0], asked.change[o, 0])
+    if not length > 0.0:
+        return 0.0, 0.0
+    _, _, rate = member_motion(model, i, asked.pose[o, 0])
+    f, _, _, energy, _ = law(
+        code, p, x - kept, rate, mode, asked.when[o], asked.level[o], model.curves,
+        model.member[MEMBER_FREE_LENGTH, i],
+    )  # fmt: skip
+    return f * along, asked.energy[o] * energy
+
+
+@kernel
+def _fill_nodes(model, asked, i, first, node):
+    """Elongation of member i, its two rates, and its part of the virtual change, at the nodes of a step.
+
+    model: with the members.
+    asked, first: an `Asked`, and the number of the first node.
+    node (NODE_ROWS, NODES): set.
+    """
+    for m in range(NODES):
+        r = asked.node_pose[first + m]
+        length, x, rate = member_motion(model, i, r)
+        _, _, along = member_work(model, i, r, asked.node_change[first + m])
+        node[X, m] = x
+        node[RATE, m] = rate
+        node[SECOND, m] = second_rate(model, i, r, asked.node_push[first + m]) if length > 0.0 else 0.0
+        node[ALONG, m] = along
+        node[LEVEL, m] = asked.node_level[first + m]
+
+
+@kernel
+def between_nodes(values, c):
+    """The polynomial through values (NODES,) at the nodes, at a fraction c of a step."""
+    above = 0.0
+    below = 0.0
+    for m in range(NODES):
+        apart = c - NODE[m]
+        if apart == 0.0:
+            return values[m]
+        w = BARYCENTRIC[m] / apart
+        above += w * values[m]
+        below += w
+    return above / below
+
+
+@kernel
+def _margin(code, p, curves, rest, time, node, c, mode, kept):
+    """How far a mode is from its end at a fraction c of a step.
+
+    code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+    time (2,): start and length of the step (s). node (NODE_ROWS, NODES): the member there.
+    mode, kept: the mode, and the permanent set (m).
+    """
+    x = between_nodes(node[X], c) - kept
+    return law_margin(code, p, x, between_nodes(node[RATE], c), mode, time[0] + c * time[1], curves, rest)
+
+
+@kernel
+def _follow(code, p, curves, rest, time, node, pieces):
+    """The modes that a member goes through in a step.
+
+    In:
+      code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+      time (2,): start and length of the step (s).
+      node (NODE_ROWS, NODES): the member at its nodes.
+    In place:
+      pieces (CHANGES + 1, PIECE): of which the first one is known, but for its end; then all.
+
+    Returns the number of the last one.
+    """
+    last = 0
+    while last < CHANGES:
+        begin = pieces[last, BEGIN]
+        mode = int(pieces[last, PIECE_MODE])
+        kept = pieces[last, PIECE_SET]
+        lower = begin
+        upper = -1.0
+        for m in range(1, NODES):
+            if NODE[m] <= begin:
+                continue
+            if _margin(code, p, curves, rest, time, node, NODE[m], mode, kept) < 0.0:
+                upper = NODE[m]
+                break
+            lower = NODE[m]
+        if upper < 0.0:
+            return last
+        if _margin(code, p, curves, rest, time, node, lower, mode, kept) >= 0.0:
+            for _ in range(HALVINGS):
+                middle = 0.5 * (lower + upper)
+                if _margin(code, p, curves, rest, time, node, middle, mode, kept) < 0.0:
+                    upper = middle
+                else:
+                    lower = middle
+        else:
+            upper = lower
+        x = between_nodes(node[X], upper) - kept
+        rate = between_nodes(node[RATE], upper)
+        t = time[0] + upper * time[1]
+        new = law_next(code, p, x, rate, between_nodes(node[SECOND], upper), mode, t, curves, rest)
+        if new == mode:
+            return last
+        last += 1
+        pieces[last, BEGIN] = upper
+        pieces[last, PIECE_MODE] = new
+        pieces[last, PIECE_SET] = kept + law_set(code, p, x, mode, new)
+    return last
+
+
+@kernel
+def _over_piece(model, asked, code, p, rest, s, node, piece, end):
+    """The integral of the force of a mode times the member's part of the virtual change, over the mode's piece.
+
+    model: with the members.
+    asked, s: an `Asked`, and the number of the step.
+    code, p (8,), rest: the law, and the member's free length (m).
+    node (NODE_ROWS, NODES): the member at the nodes.
+    piece (PIECE,), end: the mode's piece, and the fraction of the step at which it ends.
+    """
+    total = 0.0
+    begin = piece[BEGIN]
+    for g in range(GAUSS.shape[1]):
+        c = begin + (end - begin) * GAUSS[0, g]
+        f, _, _, _, _ = law(
+            code, p, between_nodes(node[X], c) - piece[PIECE_SET], between_nodes(node[RATE], c),
+            int(piece[PIECE_MODE]), asked.step_time[s, 0] + c * asked.step_time[s, 1],
+            between_nodes(node[LEVEL], c), model.curves, rest,
+        )  # fmt: skip
+        total += GAUSS[1, g] * f * between_nodes(node[ALONG], c)
+    return (end - begin) * total
+
+
+@kernel
+def _add_inertial(model, inertance, r, u, acc, price):
+    """Add what inerters do at one state.
+
+    In:
+      model: with the members.
+      inertance: at alpha = 1 (kg).
+      r (POSE,), u (D,), acc (D,): the relative pose, minus its virtual change, and its second derivative.
+    Out:
+      price (PLACES,): added to.
+    """
+    for i in range(PLACES):
+        length, _, along = member_work(model, i, r, u)
+        if length > 0.0:
+            price[i] += inertance * second_rate(model, i, r, acc) * along

@@ -1,0 +1,384 @@
+"""From Python to the compiled entries that price candidates of any laws (`asked_states`, `candidate_prices`)."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mdstopo.case.laws import Law
+from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.compiler.threads import allowed
+from mdstopo.general import candidate_prices as kernels
+from mdstopo.general.asked_states import OF_A_ROW, ask_members, keep_states
+from mdstopo.general.candidate_prices import FIELDS, NODE, NODES, PLACES
+from mdstopo.general.compile import GeneralScene
+from mdstopo.general.dimension import dimension_of, in_frame
+from mdstopo.general.extremes import COLUMNS, FRACTION, RATE, STEP
+from mdstopo.general.model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
+from mdstopo.general.quadrature_breakpoints import INTEGRALS
+from mdstopo.general.row_gradients import sign_of, wanted_rows
+from mdstopo.general.step_history import FIRST
+from mdstopo.general.variables import as_computed
+from mdstopo.mechanics.laws.table import SPRING, kernels_of, may_switch
+from mdstopo.scene.bodies import stands_as
+from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.origin import starting_places
+from mdstopo.sensitivity.candidate_pass import CandidatePass
+from mdstopo.sensitivity.candidate_prices import TILE_NUMBERS
+
+if TYPE_CHECKING:
+    from mdstopo.general.general_driver import GeneralDriver
+
+#: the highest power of time that virtual changes within a step have, and stages from which on they have it
+HIGHEST, MANY = 3, 8
+#: which square an integral is of, by `INTEGRALS`
+SQUARED = 2
+
+
+class AskedOfScene(NamedTuple):
+    """What a weighted sum of rows asks of members in one load case.
+
+    case, scene: as compiled. model: of the run, whose segments may be more than the scene's. pairs: the number of each
+    pair among those that are kept. steps: where the law of a group switches. The others as of `ask_members`.
+    """
+
+    case: Case
+    scene: GeneralScene
+    model: GeneralModel
+    pairs: dict[int, int]
+    pose: FloatArray
+    change: FloatArray
+    push: FloatArray
+    energy: FloatArray
+    when: FloatArray
+    segment: IndexArray
+    steps: "Steps | None"
+
+
+class AskedOfMembers(NamedTuple):
+    """What a weighted sum of rows asks of members, whatever they are: in all load cases, and all samples of a case."""
+
+    scenes: tuple[AskedOfScene, ...]
+
+    @classmethod
+    def of_all(cls, parts: "Sequence[AskedOfMembers]") -> "AskedOfMembers":
+        """What several motions ask together."""
+        return cls(tuple(scene for part in parts for scene in part.scenes))
+
+
+class _Rows(NamedTuple):
+    """Rows and integrals with their weights, as `ask_members` takes them."""
+
+    which: IndexArray
+    rows: FloatArray
+    factor: FloatArray
+    integrals: IndexArray
+    share: FloatArray
+
+
+def asked_of(driver: "GeneralDriver", factor: FloatArray) -> AskedOfMembers:
+    """What the rows of a driver's last evaluation ask of members, each times its factor (n_resp, R)."""
+    model, count = driver.model_of_run, driver.count
+    index = driver.room_ints[: 4 * (int(driver.limits[1]) + 1)].reshape(-1, 4)
+    asked = _rows_of(driver, factor)
+    pairs = {int(block[PAIR]): None for block in model.block if driver.case.members[block[GROUP]].candidates}
+    size = driver.scene.kinematics
+    states, each = int(index[count, FIRST]) + OF_A_ROW * len(asked.rows), size.freedoms
+    pose = np.zeros((states, len(pairs), size.pose_size))
+    change, push = np.zeros((2, states, len(pairs), each))
+    energy, when, segment = np.zeros(states), np.zeros(states), np.full(states, -1)
+    scratch = np.zeros((max(len(asked.rows), 1), len(driver.padded)))
+    arguments: tuple[Any, ...] = (
+        *driver.steps_arguments(count)[:4], driver.limits, count, *asked, np.array(list(pairs), dtype=np.int64),
+        driver.room, driver.room_ints, driver.member_state, scratch, pose, change, push, energy, when, segment,
+        driver.work,
+    )  # fmt: skip
+    ask_members(*arguments)
+    numbers = {pair: number for number, pair in enumerate(pairs)}
+    own = AskedOfScene(driver.case, driver.scene, model, numbers, pose, change, push, energy, when, segment, None)
+    if any(_switches(law) for group in driver.case.priced_groups for law in group.laws):
+        own = own._replace(steps=steps_of(driver, own, index, asked.rows))
+    return AskedOfMembers((own,))
+
+
+def _switches(law: Law) -> bool:
+    """Whether members of a law have to be followed through their modes."""
+    modes = kernels_of(type(law)).modes
+    return may_switch(law) and modes is not None and not modes.pieces
+
+
+def _rows_of(driver: "GeneralDriver", factor: FloatArray) -> _Rows:
+    """What a driver has looked at, each part of it with its weight; factor (n_resp, R): of rows."""
+    rows = [
+        (row, factor[row.response, row.row] * sign_of(driver, row.response, row.row) * row.share)
+        for row in wanted_rows(driver, False)
+    ]
+    rows = [each for each in rows if each[1] != 0.0]
+    integrals = [
+        (j, INTEGRALS[name] == SQUARED, factor[j, 0] * driver.rows[j, 0, RATE])
+        for j, name in enumerate(driver.scene.reductions)
+        if name in INTEGRALS and factor[j, 0] != 0.0
+    ]
+    return _Rows(
+        np.array([[row.response, 0] for row, _ in rows], dtype=np.int64).reshape(-1, 2),
+        np.array([row.at for row, _ in rows]).reshape(-1, COLUMNS),
+        np.array([weight for _, weight in rows], dtype=np.float64),
+        np.array([each[:2] for each in integrals], dtype=np.int64).reshape(-1, 2),
+        np.array([each[2] for each in integrals], dtype=np.float64),
+    )
+
+
+class GeneralCandidates(CandidatePass[AskedOfMembers]):
+    """The candidates of a group of any laws; place: its number in the case. The rest as of `CandidatePass`."""
+
+    def __init__(
+        self, place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None = None
+    ) -> None:
+        # as `scene.origin.ends_of` has it
+        super().__init__(group, homes, group.body_to == GROUND, count)
+        self._place = place
+        self._last: tuple[AskedOfMembers, tuple[IndexArray, FloatArray]] | None = None
+
+    def tiles(self, asked: AskedOfMembers, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
+        """(T, TILE_NUMBERS): what `price_tiles` keeps of each tile."""
+        out = np.empty((*self.shape, TILE_NUMBERS))
+        packed = self._packed(asked, self.chosen)
+        kernels.price_tiles(*self._room(asked), *packed, self.common(worth), *built, allowed(), out)
+        return out.reshape(-1, TILE_NUMBERS)
+
+    def prices_between(self, asked: AskedOfMembers, a: IndexArray, b: IndexArray) -> FloatArray:
+        """The derivatives (K,) by alpha of members from first points to second ones."""
+        if self._last is None or self._last[0] is not asked:
+            self._last = asked, self._packed(asked, (slice(None), slice(None)))
+        found, room = np.empty(len(a)), self._room(asked)
+        for start in range(0, len(a), PLACES):
+            part = slice(start, start + PLACES)
+            places = np.stack([a[part], b[part]]).astype(np.int64)
+            out = np.empty(places.shape[1])
+            kernels.price_places(*room, *self._last[1], places, out)
+            found[part] = out
+        return found
+
+    def _room(self, asked: AskedOfMembers) -> tuple[IndexArray, FloatArray]:
+        """A packed scene with room for the members of a tile, and for the numbers of any of the scenes' laws."""
+        scene, model = asked.scenes[0].scene, asked.scenes[0].model
+        segments = len(model.active)
+        room = model._replace(
+            block=np.zeros((1, ROW + 1), dtype=np.int64),
+            law=np.zeros((1, model.law.shape[1])),
+            active=np.ones((segments, 1), dtype=np.int64),
+            level=np.zeros((segments, 1, 2)),
+            power=np.ones(1),
+            member=np.zeros((len(model.member), PLACES)),
+            curves=np.zeros(_most_curves(asked)),
+        )
+        return pack_general(room, scene.kinematics)
+
+    def _packed(
+        self, asked: AskedOfMembers, chosen: tuple[IndexArray | slice, IndexArray | slice]
+    ) -> tuple[IndexArray, FloatArray]:
+        """A packed `candidate_prices.Asked`; chosen: which points of both grids."""
+        curves = np.zeros((len(asked.scenes), _most_curves(asked)))
+        points: list[list[FloatArray]] = []
+        runs: list[_Run] = []
+        rows: list[list[int]] = []
+        state = step = node = 0
+        for number, scene in enumerate(asked.scenes):
+            curves[number, : len(scene.model.curves)] = scene.model.curves
+            points.append(self._points(scene, chosen))
+            for run in self._runs(scene):
+                code, before, from_start = run.row
+                ends = state + len(run.when), step + len(run.step)
+                rows.append([number, code, state, state + before, ends[0], step, ends[1], from_start])
+                run.step[:, : kernels.FIRST_NODE] += state
+                run.step[:, kernels.FIRST_NODE] += node
+                runs.append(run)
+                (state, step), node = ends, node + len(run.node_pose)
+        arrays: tuple[Any, ...] = (
+            np.array(rows, dtype=np.int64),
+            np.array([run.rest for run in runs]),
+            np.array([run.law for run in runs]).reshape(len(runs), -1),
+            curves,
+            *(np.concatenate([getattr(run, name) for run in runs]) for name in kernels.ARRAYS),
+            *(np.array(each) for each in zip(*points, strict=True)),
+            *(each[k].T for each, k in zip(self.homes, chosen, strict=True)),
+        )
+        return FIELDS.packed(kernels.Asked(*arrays))
+
+    def _points(self, scene: AskedOfScene, chosen: tuple[IndexArray | slice, IndexArray | slice]) -> list[FloatArray]:
+        """Points of both grids (d, n) as a scene has them: in body frames, at the start, where its case has them."""
+        case, load_case = scene.case, scene.scene.load_case
+        group, dimension = case.members[self._place], dimension_of(case)
+        names = (group.body_from, group.body_to)[self.order]
+        local = [
+            in_frame(dimension.frames(load_case), name, points)
+            for name, points in zip(names, (group.from_local, group.to_local)[self.order], strict=True)
+        ]
+        stated = starting_places(case.bodies, group)[self.order]
+        home = list(stated)
+        if not stands_as(case, load_case):
+            bodies = scene.scene.bodies
+            home = [
+                dimension.places(scene.model.home, bodies.index(name), points)
+                for name, points in zip(names, local, strict=True)
+            ]
+        pairs = (local, home, stated)
+        return [each[side][chosen[side]].T for each in pairs for side in range(2)]
+
+    def _runs(self, scene: AskedOfScene) -> "list[_Run]":
+        """What each law of the group is asked for in a scene."""
+        model, group = scene.model, as_computed(scene.case).members[self._place]
+        blocks = np.flatnonzero(model.block[:, GROUP] == self._place)
+        return [_run_of(scene, k, record) for k, record in zip(blocks.tolist(), group.laws, strict=True)]
+
+
+class _Run(NamedTuple):
+    """A row of `candidate_prices.Asked.run` with its states, steps and nodes; each as there.
+
+    row: the law's code, how many states there are before the first one whose energy counts, and whether it acts from
+    the start.
+    """
+
+    row: tuple[int, int, int]
+    rest: float
+    law: FloatArray
+    pose: FloatArray
+    change: FloatArray
+    push: FloatArray
+    energy: FloatArray
+    when: FloatArray
+    level: FloatArray
+    step: IndexArray
+    step_time: FloatArray
+    node_pose: FloatArray
+    node_push: FloatArray
+    node_change: FloatArray
+    node_level: FloatArray
+
+
+def _run_of(scene: AskedOfScene, k: int, record: Law) -> _Run:
+    """What the law of block k is asked for in a scene."""
+    model, pair = scene.model, scene.pairs[int(scene.model.block[k, PAIR])]
+    free, code = getattr(record, "free_length", None), int(model.block[k, CODE])
+    moves, stores = scene.change[:, pair].any(axis=1), scene.energy != 0.0
+    acts = (scene.segment >= 0) & (model.active[scene.segment, k] != 0)
+    steps = scene.steps if _switches(record) else None
+    before = 0
+    if steps is not None:
+        states = np.arange(len(scene.when))
+    elif code == SPRING and not model.law[k, 1:3].any():
+        # forces and energies of springs are summed apart
+        moved, stored = np.flatnonzero(acts & moves), np.flatnonzero(acts & stores)
+        states, before = np.concatenate([moved, stored]), len(moved)
+    else:
+        states = np.flatnonzero(acts & (moves | stores))
+    change = scene.change[states, pair]
+    change[before if before else len(change) :] = 0.0
+    level = _level(model, k, scene.segment[states], scene.when[states])
+    parts = _no_steps(scene.pose.shape[2], change.shape[1]) if steps is None else _steps_of_law(steps, model, k, pair)
+    return _Run(
+        (code, before, int(model.active[0, k])), -1.0 if free is None else float(free), model.law[k],
+        scene.pose[states, pair][:, None], change[:, None], scene.push[states, pair], scene.energy[states],
+        scene.when[states], level, *parts,
+    )  # fmt: skip
+
+
+def _level(model: GeneralModel, k: int, segment: IndexArray, when: FloatArray) -> FloatArray:
+    """The tabulated force of the law of block k at times (T,) of segments (T,)."""
+    first, slope = model.level[segment, k].T
+    force: FloatArray = first + slope * (when - model.times[segment])
+    return force
+
+
+class Steps(NamedTuple):
+    """The steps of a motion, in the order in which members that switch go through them, each with its nodes.
+
+    step (K, 5), step_time (K, 2): as of `candidate_prices.Asked`. segment (K,): in which each is.
+    pose (nodes, G, POSE), push, change (nodes, G, D): at the nodes.
+    """
+
+    step: IndexArray
+    step_time: FloatArray
+    segment: IndexArray
+    pose: FloatArray
+    push: FloatArray
+    change: FloatArray
+
+
+def steps_of(driver: "GeneralDriver", asked: AskedOfScene, index: IndexArray, rows: FloatArray) -> Steps:
+    """The steps of a driver's last run, with partial ones and states of rows between them.
+
+    driver: with the run. asked: its states. index: of its history. rows (R, COLUMNS): whose states these are.
+    """
+    count, t = driver.count, driver.states()[0]
+    found: list[tuple[tuple[float, int, int, int], list[int], tuple[float, float], tuple[int, float]]] = []
+    for w in range(count):
+        stages = [int(index[w, FIRST]), int(index[w + 1, FIRST])]
+        found.append(((t[w], 3, 0, 0), [*stages, kernels.WHOLE], (t[w], t[w + 1] - t[w]), (w, 1.0)))
+    for m, row in enumerate(rows):
+        k, c, at = int(row[STEP]), float(row[FRACTION]), int(index[count, FIRST]) + OF_A_ROW * m
+        used = int((asked.segment[at + 1 : at + OF_A_ROW] >= 0).sum())
+        begin, length = t[k], t[k + 1] - t[k]
+        inside = 0.0 < c < 1.0
+        if used:
+            stages = [at + 1, at + 1 + used]
+            found.append(((begin, 1, m, 0), [*stages, kernels.PART], (begin, c * length), (k, c)))
+        key = (begin, 1, m, 1) if used else (begin, 4, m, 0) if inside else (begin + max(c, 0.0) * length, 0, m, 0)
+        found.append((key, [at, at + 1, kernels.POINT], (begin + c * length, 0.0), (k, c)))
+    found.sort(key=lambda each: each[0])
+    moves = asked.change.any(axis=(1, 2)) | (asked.energy != 0.0)
+    step = [
+        [*where[:2], NODES * number, where[2], int(moves[where[0] : where[1]].any())]
+        for number, (_, where, _, _) in enumerate(found)
+    ]
+    times = np.array([each[2] for each in found])
+    places = np.array([[k, min(c, 1.0) * node] for _, _, _, (k, c) in found for node in NODE])
+    (q, out), _, _ = driver.sample_response(-1, places, False, count)
+    pose, push = np.zeros((len(places), *asked.pose.shape[1:])), np.zeros((len(places), *asked.push.shape[1:]))
+    keep_states(driver.ints, driver.floats, q, out[0], out[1], np.array(list(asked.pairs), dtype=np.int64), pose, push)
+    change = [_between_stages(asked, slice(*where[:2]), *time) for (_, where, time, _) in found]
+    return Steps(
+        np.array(step, dtype=np.int64).reshape(-1, 5), times, asked.segment[[each[0] for each in step]], pose, push,
+        np.concatenate(change),
+    )  # fmt: skip
+
+
+def _between_stages(asked: AskedOfScene, stages: slice, begin: float, length: float) -> FloatArray:
+    """What the virtual changes of pairs are at the nodes of a step, by the fraction of the step, (NODES, G, D).
+
+    It is the polynomial with the same moments: sums over stages of what is smooth in time are exact to a high order.
+    asked, stages: states, and which of them are the step's. begin, length: of the step (s).
+    """
+    change = asked.change[stages]
+    if length <= 0.0 or not change.any():
+        return np.zeros((NODES, *change.shape[1:]))
+    degree = HIGHEST if len(change) >= MANY else min(len(change) - 1, HIGHEST - 1)
+    fraction = (asked.when[stages] - begin) / length
+    at_stages = np.polynomial.legendre.legvander(2.0 * fraction - 1.0, degree)
+    at_nodes = np.polynomial.legendre.legvander(2.0 * NODE - 1.0, degree) * (2.0 * np.arange(degree + 1) + 1.0)
+    moments = np.einsum("jm,jgd->mgd", at_stages, change)
+    found: FloatArray = np.einsum("nm,mgd->ngd", at_nodes, moments)
+    return found
+
+
+def _steps_of_law(steps: Steps, model: GeneralModel, k: int, pair: int) -> tuple[Any, ...]:
+    """The steps in which the law of block k acts, with their nodes, as of `_Run`."""
+    acts = model.active[steps.segment, k] != 0
+    nodes = np.flatnonzero(np.repeat(acts, NODES))
+    step = steps.step[acts].copy()
+    step[:, kernels.FIRST_NODE] = NODES * np.arange(len(step))
+    time = steps.step_time[acts]
+    when = (time[:, :1] + time[:, 1:] * NODE).ravel()
+    level = _level(model, k, np.repeat(steps.segment[acts], NODES), when)
+    return step, time, steps.pose[nodes, pair], steps.push[nodes, pair], steps.change[nodes, pair], level
+
+
+def _no_steps(pose: int, freedoms: int) -> tuple[Any, ...]:
+    """No steps and nodes, as of `_Run`; pose, freedoms: numbers of a pose and of its change."""
+    nodes = np.zeros((0, pose)), np.zeros((0, freedoms)), np.zeros((0, freedoms)), np.zeros(0)
+    return np.zeros((0, 5), dtype=np.int64), np.zeros((0, 2)), *nodes
+
+
+def _most_curves(asked: AskedOfMembers) -> int:
+    """The most numbers that the laws of a scene have."""
+    return max(len(scene.model.curves) for scene in asked.scenes)

@@ -1,0 +1,156 @@
+"""A pass over the candidates of a group, whoever computes their prices: what all of it finds, and which are the best.
+
+Prices are computed by compiled entries that keep a few numbers of each tile of TALL by BROAD points, and those of
+single candidates (`sensitivity.pricing`, `general.pricing`).
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from mdstopo.case.candidates import lengths_between, spread
+from mdstopo.case.model import MemberGroup
+from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.sensitivity.candidate_prices import (
+    ABOVE,
+    BELOW,
+    BEST,
+    BROAD,
+    COMMON,
+    COST,
+    RATIO,
+    SEEN,
+    TALL,
+    TOGETHER,
+    UPPER,
+    WORTH,
+)
+
+#: tiles of which all candidates are looked at, of those with the largest gains
+TILES = 64
+#: of a tile, how many are told before any is of which so many are told already
+SHARE = 8
+
+A = TypeVar("A")
+
+
+@dataclass(frozen=True)
+class Passed:
+    """What a pass over the candidates of a group has found, beside its members.
+
+    seen: how many there are. best: the largest gain of one (of the objective, to first order, with alpha at its upper
+    bound), together: the sum over all that gain; ratio: the largest gain for a unit of cost. i, j (K,), gain (K,):
+    those with the largest gains, largest first, though some may be below zero.
+    """
+
+    seen: int
+    best: float
+    together: float
+    ratio: float
+    i: IndexArray
+    j: IndexArray
+    gain: FloatArray
+
+
+class CandidatePass(ABC, Generic[A]):
+    """The candidates of a group, between the points of two grids; A: what a motion asks of members.
+
+    group: as the scene has it.
+    homes: where its points P and Q are at the start, (n, d) each.
+    turned: whether the points Q come first inside, as the scene has it.
+    count: about how many of the candidates, evenly spread; None: all.
+    """
+
+    def __init__(
+        self, group: MemberGroup, homes: tuple[FloatArray, FloatArray], turned: bool, count: int | None
+    ) -> None:
+        assert group.candidates is not None
+        self.candidates, self.upper = group.candidates, group.upper
+        self.order = slice(None, None, -1 if turned else 1)
+        self.homes = homes[self.order]
+        self._built = (group.from_index, group.to_index)[self.order]
+        self.chosen = spread(len(self.homes[0]), len(self.homes[1]), count)
+
+    @abstractmethod
+    def tiles(self, asked: A, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
+        """(T, TILE_NUMBERS): what the pass keeps of each tile; worth: of a unit of cost; built: of `_by_tile`."""
+
+    @abstractmethod
+    def prices_between(self, asked: A, a: IndexArray, b: IndexArray) -> FloatArray:
+        """The derivatives (K,) by alpha of members from first points to second ones."""
+
+    def prices(self, asked: A, i: IndexArray, j: IndexArray) -> FloatArray:
+        """The derivatives (K,) by alpha of members from points P (K,) to points Q (K,)."""
+        return self.prices_between(asked, *(i, j)[self.order])
+
+    def go_through(self, asked: A, worth: float, most: int) -> Passed:
+        """A pass over all of them; most: how many are told.
+
+        worth: of a unit of cost, the multipliers of volume rows.
+        """
+        tiles = self.tiles(asked, worth, self._by_tile())
+        best = tiles[:, BEST]
+        chosen = np.argsort(-best, kind="stable")[:TILES]
+        a, b, rank, gain = (np.concatenate(each) for each in zip(
+            *(self._of_tile(asked, int(tile), worth) for tile in chosen), strict=True
+        ))  # fmt: skip
+        # of every tile some before more of any: neighbours are alike
+        order = np.lexsort((-gain, rank // SHARE))[:most]
+        order = order[np.argsort(-gain[order], kind="stable")]
+        i, j = (self.chosen[0][a[order]], self.chosen[1][b[order]])[self.order]
+        seen, together = int(tiles[:, SEEN].sum()), float(tiles[:, TOGETHER].sum())
+        return Passed(seen, max(float(best.max()), 0.0), together, float(tiles[:, RATIO].max()), i, j, gain[order])
+
+    def common(self, worth: float) -> FloatArray:
+        """(COMMON,) of what candidates have in common, without what belongs to a law; worth: of a unit of cost."""
+        own = self.candidates
+        common = np.zeros(COMMON)
+        common[COST] = -1.0 if own.cost is None else own.cost
+        common[BELOW] = np.nextafter(own.shortest, -np.inf) if own.shortest else 0.0
+        common[ABOVE] = np.nextafter(own.longest, np.inf)
+        common[WORTH], common[UPPER] = worth, self.upper
+        return common
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many tiles there are along the first and along the second points."""
+        rows, columns = self.chosen
+        return -(-len(rows) // TALL), -(-len(columns) // BROAD)
+
+    def _by_tile(self) -> tuple[IndexArray, IndexArray]:
+        """(T + 1,) and (any,): by tile, where in it the members are that are built."""
+        a, b = self._built_here()
+        tile = a // TALL * self.shape[1] + b // BROAD
+        order = np.argsort(tile, kind="stable")
+        begin = np.searchsorted(tile[order], np.arange(self.shape[0] * self.shape[1] + 1)).astype(np.int64)
+        return begin, (a % TALL * BROAD + b % BROAD)[order].astype(np.int64)
+
+    def _built_here(self) -> tuple[IndexArray, IndexArray]:
+        """The members whose points are among those that are looked at, by the places of these there."""
+        found = [np.searchsorted(chosen, index) for chosen, index in zip(self.chosen, self._built, strict=True)]
+        inside = np.ones(len(self._built[0]), dtype=np.bool_)
+        for place, chosen, index in zip(found, self.chosen, self._built, strict=True):
+            inside &= chosen[np.minimum(place, len(chosen) - 1)] == index
+        return found[0][inside], found[1][inside]
+
+    def _of_tile(self, asked: A, tile: int, worth: float) -> tuple[IndexArray, IndexArray, IndexArray, FloatArray]:
+        """Of all candidates of a tile that may enter: the places of their points among those that are looked at, their
+        ranks in the tile, and their gains."""
+        rows, columns = self.chosen
+        width = len(columns)
+        row, column = tile // self.shape[1] * TALL, tile % self.shape[1] * BROAD
+        own_a = np.arange(row, min(row + TALL, len(rows)))
+        own_b = np.arange(column, min(column + BROAD, width))
+        a, b = np.repeat(own_a, len(own_b)), np.tile(own_b, len(own_a))
+        there = self._built_here()
+        new = ~np.isin(a * width + b, there[0] * width + there[1])
+        length = lengths_between(self.homes[0][rows[a]], self.homes[1][columns[b]])
+        new &= (length >= self.candidates.shortest) & (length <= self.candidates.longest) & (length > 0.0)
+        a, b, length = a[new], b[new], length[new]
+        cost = length if self.candidates.cost is None else self.candidates.cost
+        gain = -self.upper * (self.prices_between(asked, rows[a], columns[b]) + worth * cost)
+        rank = np.empty(len(gain), dtype=np.intp)
+        rank[np.argsort(-gain, kind="stable")] = np.arange(len(gain))
+        return a, b, rank, gain

@@ -1,0 +1,281 @@
+"""Prices of candidates that are not built, in scenes with joints, contacts, loads, any laws and responses, in space."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mdstopo.case import candidates
+from mdstopo.case.candidates import with_members
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+
+#: relative to the largest
+AGREE = 1e-10
+SPRING = {"type": "spring", "stiffness": 900}
+
+
+def looked(response, over_time):
+    """An objective."""
+    return {"objectives": {"G": {"response": response, "over_time": over_time}}}
+
+
+def arm(law=None, **more):
+    """An arm that hangs on a hinge, with a foot hinged to it that knocks at a stop; candidates from the foot to the
+    ground. The ground shakes a sled, which a beam joins with the arm."""
+    return {
+        "gravity": [0, -9.8],
+        "time": {"end": 0.3},
+        "bodies": {
+            "arm": {"mass": 4, "inertia": 0.4, "position": [0.5, 0]},
+            "foot": {"mass": 2, "inertia": 0.1, "position": [1, -0.4], "angle": 0.2},
+            "sled": {"mass": 3, "inertia": 1, "position": [2.5, 0.5]},
+        },
+        "joints": [
+            {"type": "revolute", "bodies": ["ground", "arm"], "at": [0, 0]},
+            {"type": "revolute", "bodies": ["arm", "foot"], "at": [1, 0]},
+        ],
+        "points": {
+            "p": {"body": "foot", "grid": {"line": {"from": [0.9, -0.3], "to": [1.1, -0.6], "count": 9}}},
+            "q": {"body": "ground", "grid": {"line": {"from": [0.2, -1.2], "to": [2, -1], "count": 21}}},
+        },
+        "members": {
+            "web": {"from": "p", "to": "q", "law": law or SPRING, "candidates": "priced"},
+            "tie": {
+                "from": {"body": "arm", "at": [0.8, 0]}, "to": {"body": "sled", "at": [2.3, 0.4]},
+                "law": {"type": "spring", "stiffness": 300, "damping": 4},
+            },
+        },
+        "loads": [{"body": "foot", "force": ["60*sin(20*t)", 5], "at": [1, -0.5], "frame": "body"}],
+        "motions": [
+            {"body": "sled", "x": {"position": "2.5 + 0.1*sin(9*t)"}, "y": {"velocity": 0}, "angle": {"velocity": 0}},
+        ],
+        "design": {"initial": 0.4, "lower": 0},
+        "objectives": {"G": {"response": {"displacement": {"body": "foot", "component": "x"}}, "over_time": "max_abs"}},
+        **more,
+    }  # fmt: skip
+
+
+def in_space(law=None, **more):
+    """A mast on a ball joint, pushed and turned; candidates from it to a grid on the ground."""
+    return {
+        "dimension": 3,
+        "gravity": [0, 0, -9.8],
+        "time": {"end": 0.3},
+        "bodies": {
+            "mast": {
+                "mass": 5, "inertia": [[0.6, 0.05, 0], [0.05, 0.5, 0.02], [0, 0.02, 0.3]], "position": [0, 0, 1],
+                "angular_velocity": [0, 0, 1],
+            },
+        },
+        "joints": [{"type": "spherical", "bodies": ["ground", "mast"], "at": [0, 0, 0]}],
+        "points": {
+            "p": {
+                "body": "mast",
+                "grid": {"lattice": {"from": [0.1, 0.1, 0.6], "to": [0.2, -0.1, 1.6], "count": [1, 2, 5]}},
+            },
+            "q": {
+                "body": "ground",
+                "grid": {"plane": {"corner": [-1.2, -1, 0], "edges": [[2.4, 0, 0], [0, 2.2, 0]], "count": [5, 4]}},
+            },
+        },
+        "members": {"web": {"from": "p", "to": "q", "law": law or SPRING, "candidates": "priced"}},
+        "loads": [{"body": "mast", "force": [40, 10, 0], "at": [0.1, 0, 1.5], "frame": "body"}],
+        "design": {"initial": 0.4, "lower": 0},
+        "objectives": {"G": {"response": {"displacement": {"body": "mast", "component": "x"}}, "over_time": "max_abs"}},
+        **more,
+    }  # fmt: skip
+
+
+def free_in_space(law=None, **more):
+    """The same without its joint: steps of collocation where the law is smooth."""
+    scene = in_space(law, title="free", **more)
+    del scene["joints"]
+    scene["members"]["tie"] = {
+        "from": {"body": "mast", "at": [0, 0, 0]}, "to": {"body": "ground", "at": [0, 0.1, -0.5]},
+        "law": {"type": "spring", "stiffness": 4000, "damping": 20},
+    }  # fmt: skip
+    return scene
+
+
+ENERGY = looked("energy", "max")
+PULL = {"member_force": {"group": "tie"}}
+PUSH = {"acceleration": {"body": "foot", "at": [1, -0.5]}}
+CURVE = {"type": "curve", "curve": [[-0.5, -90], [-0.1, -30], [0, 0], [0.05, 10], [0.4, 140]]}
+FORMULA = {
+    "type": "expression",
+    "energy": "k*x^2/2 + b*x^4/4",
+    "damping": "c*xd",
+    "parameters": {"k": 300, "b": 2e4, "c": 3},
+}
+SEVERAL = [
+    {"type": "gap", "stiffness": 50, "gap": -3},
+    {"type": "table", "table": [[0, 0], [0.1, 25], [0.2, 0]], "active_until": 0.25},
+    {**SPRING, "free_length": 0.6, "active_from": 0.11},
+    {"type": "pulse", "peak": 40, "rate": 500, "time": 0.1},
+]  # fmt: skip
+STOP = {
+    "contacts": [
+        {
+            "points": "p", "on": {"body": "ground", "from": [0, -0.75], "to": [2, -0.72]},
+            "stiffness": 4000, "damping": 9, "friction": 0.3, "slip": 0.1,
+        },
+    ],
+}  # fmt: skip
+TWICE = {
+    "loads": [],
+    "load_cases": {
+        "one": {"loads": [{"body": "foot", "force": [60, 0]}]},
+        "two": {"loads": [{"body": "arm", "moment": "9*sin(9*t)"}], "time": {"end": 0.2}},
+    },
+    "objectives": {"G": {"response": PUSH, "over_time": "rms", "load_case": "one"}},
+    "constraints": [
+        {"response": PULL, "over_time": "max", "limit": 20, "load_case": "two"},
+        {"response": {"angle": {"body": "arm"}}, "over_time": "min", "at_least": -0.01, "load_case": "one"},
+        {"volume": "all", "limit": 30},
+    ],
+}
+#: where the same motion comes out, whether members of alpha = 0 are there or not, and so the same numbers
+SMOOTH = {
+    "springs": arm(),
+    "damped": arm({**SPRING, "damping": 7, "preload": 2}),
+    "cubic": arm({"type": "cubic", "stiffness": 500, "cubic": 9000}, **looked(PUSH, "max")),
+    "curve": arm(CURVE, **ENERGY),
+    "actuator": arm({"type": "actuator", "proportional": 80, "derivative": 4, "target": -0.05}, **looked(PULL, "max")),
+    "formula": arm(FORMULA, **looked("energy", "mean")),
+    "inerter": arm({"type": "inerter", "inertance": 2}, **looked(PUSH, "rms")),
+    "several laws": arm(SEVERAL, **looked(PULL, "mean")),
+    "energy of springs": arm({**SPRING, "free_length": 0.7}, **ENERGY),
+    "with a stop": arm(**STOP),
+    "two load cases": arm(**TWICE),
+    "in space": in_space(),
+    "damped in space": in_space({**SPRING, "damping": 7, "preload": 2}, **ENERGY),
+    "energy in space": in_space(**looked("energy", "mean")),
+    "formula in space": in_space(FORMULA),
+    "free and in space": free_in_space(),
+}
+
+
+#: laws that switch
+SWITCHED = {
+    "slack": arm({"type": "gap", "stiffness": 900, "gap": 0.02}),
+    "slack and damped": arm({"type": "gap", "stiffness": 900, "gap": 0.02, "damping": 9}),
+    "clipped": arm({"type": "gap", "stiffness": 900, "gap": 0.02, "damping": 30, "clip": True}, **ENERGY),
+    "crushed": arm({"type": "crush", "stiffness": 9000, "force": 40}, **looked(PULL, "max")),
+    "crushed later": arm({"type": "crush", "stiffness": 9000, "force": 40, "active_from": 0.1}),
+    "kinked formula": arm({"type": "expression", "force": "k*max(x - 0.02, 0)", "parameters": {"k": 500}}),
+    "slack in space": in_space({"type": "gap", "stiffness": 900, "gap": 0.01}),
+    "crushed in space": in_space({"type": "crush", "stiffness": 9000, "force": 40}, **ENERGY),
+}
+
+
+#: fixed steps, in which no motion depends on which members of alpha = 0 there are
+STEP = 0.005
+#: the spatial ones, whose kernels take long to compile
+IN_SPACE = [name for name in (*SMOOTH, *SWITCHED) if name.endswith("in space")]
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch):
+    """Some 40 of the candidates are built."""
+    monkeypatch.setattr(candidates, "START_SET", 40)
+
+
+class Priced:
+    """A scene with all its candidates: of which pairs they are, the design of those that are built, and what rows ask
+    of any, beside the gradient of all of them at the same design."""
+
+    def __init__(self, scene, step=STEP):
+        solver = {"step": step, **({} if "free" in scene.get("title", "") else {"integrator": "runge_kutta"})}
+        self.case = case = read_case(json.dumps({"format": 1, **scene, "solver": solver}))
+        group = case.members[0]
+        self.i, self.j = np.divmod(np.arange(group.candidates.count), len(group.to_local))
+        whole = with_members(case, {"web": (self.i, self.j)})
+        self.evaluator = Evaluator(case)
+        problem = self.evaluator.problem()
+        x = np.random.default_rng(5).uniform(0.1, 1.0, case.n_design)
+        x[: len(group)][::2] = 0.0
+        evaluation = problem.evaluation(x)
+        assert evaluation.status.ok, evaluation.message
+        sample = problem.sample_of(evaluation)
+        factor = np.linspace(1.0, 0.5, len(sample.rows) + len(sample.constraint_rows))
+        self.asked = problem.asked_of_members(evaluation, factor)
+        at = group.from_index * len(group.to_local) + group.to_index
+        self.built = np.isin(self.i * len(group.to_local) + self.j, at)
+        alpha = np.zeros(whole.n_design)
+        alpha[: len(self.i)][self.built] = x[: len(group)]
+        alpha[len(self.i) :] = x[len(group) :]
+        found = Evaluator(whole).problem().evaluate(alpha)
+        rows = np.concatenate([found.gradients, found.constraint_gradients.reshape(-1, whole.n_design)])
+        self.gradient = (factor @ rows)[: len(self.i)]
+        self.size = np.abs(self.gradient).max()
+        assert self.size > 0.0
+        self.candidates = self.evaluator.candidates_of(group)
+
+    @property
+    def error(self):
+        """The largest difference of a price, relative to the largest one."""
+        return np.abs(self.candidates.prices(self.asked, self.i, self.j) - self.gradient).max() / self.size
+
+
+@pytest.mark.parametrize("name", [name for name in SMOOTH if name not in IN_SPACE])
+def test_prices_are_the_gradient_of_candidates_that_are_built(name):
+    assert Priced(SMOOTH[name]).error <= AGREE
+
+
+@pytest.mark.parametrize("name", [name for name in SMOOTH if name in IN_SPACE])
+def test_prices_in_space_are_the_gradient_of_candidates_that_are_built(name):
+    assert Priced(SMOOTH[name]).error <= AGREE
+
+
+@pytest.mark.parametrize("name", [name for name in SWITCHED if name not in IN_SPACE])
+def test_prices_of_laws_that_switch_come_to_the_gradient_as_steps_become_shorter(name):
+    # of sixth order, until rounding; built, the same members have all steps end at their switches
+    long, short = (Priced(SWITCHED[name], step).error for step in (0.01, 0.0025))
+    assert short <= 1e-8
+    assert short <= long / 256.0
+
+
+@pytest.mark.parametrize("name", [name for name in SWITCHED if name in IN_SPACE])
+def test_prices_in_space_of_laws_that_switch_come_to_the_gradient_as_steps_become_shorter(name):
+    long, short = (Priced(SWITCHED[name], step).error for step in (0.01, 0.0025))
+    assert short <= 1e-10
+    assert short <= long / 256.0
+
+
+def test_a_pass_finds_the_best_candidates_and_what_all_gain():
+    scene = Priced(arm(SEVERAL, **looked(PULL, "mean")))
+    gradient, size = scene.gradient, scene.size
+    worth = 0.1 * size
+    gain = np.where(scene.built, -np.inf, -(gradient + worth))
+    found = scene.candidates.go_through(scene.asked, worth, 10**6)
+    assert found.seen == (~scene.built).sum()
+    assert abs(found.best - max(gain.max(), 0.0)) <= AGREE * size
+    assert abs(found.together - np.maximum(gain, 0.0).sum()) <= 1e-9 * len(gain) * size
+    assert abs(found.ratio - np.maximum(gain, 0.0).max()) <= AGREE * size
+    told = sorted(zip(found.i.tolist(), found.j.tolist(), strict=True))
+    assert told == sorted(zip(scene.i[~scene.built].tolist(), scene.j[~scene.built].tolist(), strict=True))
+    wanted = gain.reshape(9, 21)[found.i, found.j]
+    assert np.abs(found.gain - wanted).max() <= AGREE * size
+
+
+def test_a_pass_over_a_part_of_the_candidates_prices_them_as_the_whole_pass_does():
+    scene = Priced(SWITCHED["clipped"])
+    part = scene.evaluator.candidates_of(scene.case.members[0], 60).go_through(scene.asked, 0.0, 10**6)
+    whole = scene.candidates.go_through(scene.asked, 0.0, 10**6)
+    assert 30 < part.seen < 100 < whole.seen
+    prices = np.full((9, 21), np.nan)
+    prices[whole.i, whole.j] = whole.gain
+    assert np.array_equal(prices[part.i, part.j], part.gain)
+
+
+def test_a_pass_does_not_depend_on_threads(monkeypatch):
+    scene = Priced(SWITCHED["slack"])
+    found = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("MDSTOPO_THREADS", threads)
+        found.append(scene.candidates.go_through(scene.asked, 0.1 * scene.size, 100))
+    one, other = found
+    assert (one.seen, one.best, one.together, one.ratio) == (other.seen, other.best, other.together, other.ratio)
+    assert np.array_equal(one.i, other.i)
+    assert np.array_equal(one.j, other.j)
