@@ -112,7 +112,7 @@ def install(wheel: Path, folder: Path, kind: str) -> Path:
     if kind:
         (site,) = folder.glob("lib/python*/site-packages")
         has = dict.fromkeys(PROCESSORS[kind][1], True)
-        line = f"import llvmlite.binding; llvmlite.binding.get_host_cpu_features = lambda: {has}\n"
+        line = f"import llvmlite.binding as b; b.get_host_cpu_features = lambda has=b.targets.FeatureMap({has}): has\n"
         (site / "another_processor.pth").write_text(line)
     return folder / "bin/mdstopo"
 
