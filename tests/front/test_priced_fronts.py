@@ -82,7 +82,7 @@ def test_several_starts_of_each_point_are_refused() -> None:
 
 
 def test_runs_of_a_sweep_have_members_of_their_own(tmp_path: Path) -> None:
-    (tmp_path / "e.json").write_text(json.dumps(stiff()))
+    (tmp_path / "e.json").write_text(json.dumps(stiff() | LOOSE))
     path = tmp_path / "sweep.h5"
     stiffness = {"members.struts.law.stiffness": "20000,40000"}
     outcome = run_sweep(tmp_path / "e.json", {}, stiffness, path=path, workers=1)
