@@ -1,4 +1,4 @@
-"""Every call of an entry is held to the table of those that a wheel has machine code for (packaging/entries.txt)."""
+"""Tests call entries with such types of arguments alone as a wheel has machine code for (packaging/entries.txt)."""
 
 import runpy
 import sys
@@ -12,7 +12,7 @@ SHIP = Path(__file__).resolve().parents[1] / "packaging" / "ship_kernels.py"
 
 @cache
 def table() -> frozenset[tuple[str, str, str]]:
-    """Module and name of an entry, and types of its arguments."""
+    """Of all entries module, name, and types of the arguments, one text for all of them."""
     return frozenset(runpy.run_path(str(SHIP))["table"]())
 
 
@@ -21,7 +21,7 @@ def held(entry: Entry, types: str) -> None:
     module, name = entry.__module__, entry.__name__
     of_package = module.startswith("mdstopo.") and getattr(sys.modules.get(module), name, None) is entry
     if of_package and (module, name, types) not in table():
-        raise AssertionError(f"a wheel would not have the code for this call: {module}.{name} {types} ({SHIP.parent})")
+        raise AssertionError(f"{SHIP.with_name('entries.txt')} has no line for this call: {module}.{name} {types}")
 
 
 def hold_calls() -> None:

@@ -50,7 +50,7 @@ def test_changes_are_made_where_their_surroundings_are() -> None:
 def test_the_worked_examples_do_what_the_page_says(tmp_path: Path) -> None:
     copy = tmp_path / "project"
     ignored = shutil.ignore_patterns("__pycache__")
-    for name in ("mdstopo", "tests", "docs", "documentation", "cases"):
+    for name in ("mdstopo", "tests", "docs", "documentation", "cases", "packaging"):
         shutil.copytree(ROOT / name, copy / name, ignore=ignored)
     for name in ("pyproject.toml", "mkdocs.yml"):
         shutil.copy(ROOT / name, copy)
