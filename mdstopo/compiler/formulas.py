@@ -7,8 +7,8 @@ numbers of the group; the address of a set is that of a table of the addresses o
 
 Names in formulas are those of `NAMES`, "p 0" and so on for the numbers of p, and "bit 0" and so on for those of mode.
 
-A mode's formulas go on a little beyond its end, for steps that are shortened afterwards. A root or a broken power of a
-negative number is taken as that of 0 there; a NaN anywhere else, where the smallest margin is more than `CLEAR`.
+A mode's formulas go on a little beyond its end, for steps that are shortened afterwards. A root or a fractional power
+of a negative number is taken as that of 0 there; a NaN anywhere else, where the smallest margin is more than `CLEAR`.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def call_formula(address: float, p: Floats, x: float, xd: float, t: float, l0: f
 
 
 class FormulaCalls:
-    """Many calls from Python of the functions in the table at an address, with one set of parameters p."""
+    """Calls from Python of the functions whose table is at an address, all with the parameters p (any,)."""
 
     def __init__(self, address: float, p: Floats) -> None:
         self._table = ctypes.cast(int(address), ctypes.POINTER(ctypes.c_void_p))

@@ -1,6 +1,7 @@
 """Where slopes of a formula begin with a root: at `if(x > 0, k*x^1.5, 0)` the slope is as the root of x.
 
-There the motion is as smooth as a higher power, but what it does to derivatives is not, and steps have to be short.
+The motion is smooth enough there for steps of any length, but its derivatives by the design are not: beside such a
+switch steps have to be short (`general.adaptive_steps`).
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ _POINTS, _ALIKE = 3, 1e-9
 
 
 def sharp_switches(formula: Expression, margins: Sequence[Expression], moving: Sequence[str]) -> int:
-    """The switches, as bits, at which a broken power in a formula begins: those whose margin vanishes with its base.
+    """The switches at which a fractional power in a formula begins, as bits: their margin vanishes with its base.
 
     margins: of the switches. moving: names that change during a motion.
     """
     found = 0
-    bases = {part.operands[0] for part in parts(formula) if _is_broken(part)}
+    bases = {part.operands[0] for part in parts(formula) if _is_fractional(part)}
     for base in bases:
         if set(moving) & set(names_in(base)):
             for place, margin in enumerate(margins):
@@ -32,7 +33,7 @@ def sharp_switches(formula: Expression, margins: Sequence[Expression], moving: S
     return found
 
 
-def _is_broken(part: Expression) -> bool:
+def _is_fractional(part: Expression) -> bool:
     """Whether an operation is a root or a power with a number that is not whole, or not known."""
     if part.operator == "sqrt":
         return True

@@ -26,6 +26,6 @@ FOUND = {
 
 
 @pytest.mark.parametrize("law", FOUND)
-def test_switches_at_which_a_broken_power_begins_are_found(law: tuple[str, str]) -> None:
+def test_switches_at_which_a_fractional_power_begins_are_found(law: tuple[str, str]) -> None:
     force, names = law
     assert program(force, None, None, tuple(names)).sharp == FOUND[law]

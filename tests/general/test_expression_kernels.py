@@ -254,7 +254,7 @@ def test_a_margin_of_any_scale_tells_a_distance() -> None:
         assert kernels.margin(1.0 + 1e-7, 0.0, mode) == pytest.approx(-1e-7, rel=1e-5)
 
 
-#: a contact that begins with a broken power, in several spellings
+#: a contact that begins with a fractional power, in several spellings
 CONTACTS = (
     "if(x > 0, k*x^n*(1 + d*xd), 0)",
     "k*max(x, 0)^n*(1 + d*xd)",
@@ -265,7 +265,7 @@ CONTACTS = (
 
 
 @pytest.mark.parametrize("text", CONTACTS)
-def test_a_broken_power_is_finite_beyond_its_end_and_where_it_is_not_looked_at(text: str) -> None:
+def test_a_fractional_power_is_finite_beyond_its_end_and_where_it_is_not_looked_at(text: str) -> None:
     parameters = {"k": 4e3, "n": 1.5, "d": 0.4}
     kernels, plain = (Kernels(law_of(each, **parameters)) for each in (text, CONTACTS[0]))
     for side in (0.1, -0.1):
