@@ -132,7 +132,7 @@ def _modules() -> Iterator[str]:
 
 
 def mistakes(stated: list[Stated]) -> list[str]:
-    """What is wrong with the table: entries that it has not or that there are not, types that cannot be."""
+    """What is wrong with the table: entries that it lacks or that there are not, other numbers of arguments."""
     known = entries()
     has = {(each.module, each.name) for each in stated}
     found = [f"{module}.{name} has no line in {TABLE.name}" for module, name in sorted(known.keys() - has)]

@@ -182,6 +182,14 @@ def _pull(problem: SeatProblem, smooth: float) -> Any:
         return part * part * (3.0 - 2.0 * part)
 
     def pull(c: Array, s: Array, com: Any, speed: Any, w: Array, acts: Array, strength: Array) -> Any:
+        """Forces (B,) along x and y, and moments (B,), at one state.
+
+        c, s (B,): cosines and sines of the bodies' angles.
+        com, speed: of the centres of mass, x (B,) and y (B,) (m), and their rates (m/s).
+        w (B,): angular velocities (rad/s).
+        acts: 1 while actuators act, else 0.
+        strength (N,): what each member's force is multiplied by.
+        """
         cm, sm, wm = of @ c, of @ s, of @ w
         ax, ay = cm * qx - sm * qy, sm * qx + cm * qy
         dx, dy = of @ com[0] + ax - px, of @ com[1] + ay - py

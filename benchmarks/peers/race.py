@@ -98,7 +98,11 @@ def race(
 ) -> list[list[Measured]]:
     """For each design everything that works, in the order of the entries.
 
+    course: what all run on.
+    entries: programs with their settings.
     tell: given a sentence before what takes long, and for whatever is left out, and why.
+    rounds, seconds: how often all are timed in turn, and how long each is then repeated.
+    peers: all programs by name.
     """
     with TemporaryDirectory() as folder, ExitStack() as stack:
         _write(course, Path(folder))
@@ -116,6 +120,8 @@ def race(
 
 @dataclass(frozen=True)
 class _Made:
+    """An entry that its process has made ready. which: its number there; answer: what the process has said of it."""
+
     entry: Entry
     process: "_Process"
     which: int
