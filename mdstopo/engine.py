@@ -56,8 +56,8 @@ class Evaluator:
 
     beside: compile with a second process at the first use on a machine; share: what else that does (`warm`). sample:
     0, or which of the scene's other roundings it computes (`scene.rounding`); what it tells is then not in the file's
-    coordinates. beyond: why the general kernels are needed although the case alone does not. Raises CaseError where the
-    case asks for what the engine cannot do yet.
+    coordinates. beyond: why the kernels of general scenes are taken for a case that does not need them by itself, empty
+    where nothing else asks for them. Raises CaseError where the case asks for what the engine cannot do yet.
     """
 
     def __init__(
@@ -201,9 +201,10 @@ class Evaluator:
         return self._evaluation(looked, gradient, work_named(_total(work)), status, message)
 
     def _side_by_side(self, design: FloatArray, exact: bool, rows: Rows) -> dict[str, Outcome]:
-        """What drivers have found of all load cases, each on a thread of its own; nothing where that does not pay.
+        """Outcomes of all load cases by name, evaluated side by side on threads; empty where that does not pay.
 
-        The first evaluation of each kind takes one after the other: it may have to compile.
+        The first evaluation with gradients and the first one without take one load case after the other: either may
+        have to compile.
         """
         took = {name: self._took.get((name, exact), 0.0) for name, _, _ in self._seen}
         pays = self.threads > 1 and len(took) > 1 and min(took.values()) > 0.0 and not self._may_be_coarse

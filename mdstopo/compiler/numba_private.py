@@ -901,7 +901,7 @@ class _Context(CPUContext):
     """What is compiled for our target; functions of Numba's own inside ours as `_jit_without_code` has them."""
 
     def insert_const_bytes(self, mod: Any, bytes: bytes, name: str | None = None) -> Any:
-        """A constant; its name is the same in every process, which Numba's is not: texts are hashed anew in each."""
+        """A constant, named by what is in it: Numba's name has Python's hash of it, which differs by process."""
         return super().insert_const_bytes(mod, bytes, name or hashlib.sha256(bytes).hexdigest()[:16])
 
     def _compile_subroutine_no_cache(
@@ -974,13 +974,14 @@ def _remember_signatures() -> None:
 
 
 def _name_flags_in_order() -> None:
-    """Symbols tell the flags of floating point: in one order, whatever the process hashes texts by."""
+    """Symbols have the flags of fast arithmetic in them: sorted, because the order of a set differs by process."""
     options: Any = cpu_options.FastMathOptions
     options.encode = lambda self: str(sorted(self.flags))
 
 
 def _spare_flags() -> None:
-    """Flags of functions are compared at every call: those that were set first, and defaults where these differ."""
+    """Flags of functions are compared at every call, option by option. Those that were set are compared first, which
+    nearly always is enough; defaults are filled in only where these differ."""
     config: Any = targetconfig.TargetConfig
 
     def values(self: Any) -> dict[str, Any]:
@@ -996,7 +997,7 @@ def _spare_flags() -> None:
 
 
 def _spare_variables() -> None:
-    """Which variables a statement mentions is asked again and again; most of what it holds is none, by its type."""
+    """Which variables a statement mentions is asked again and again: what by its type can hold none is passed over."""
     instruction: Any = ir.Inst
     found_in, variable = instruction._rec_list_vars, ir.Var
     others = frozenset({ir.Loc, str, int, float, bool, type(None)})

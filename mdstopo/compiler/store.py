@@ -198,9 +198,9 @@ def shipped_folder() -> Path | None:
 
 
 def is_kept(name: str) -> bool:
-    """Whether kernels are kept of which a file of that name, in the folder of this source, is the note.
+    """Whether the kernels are there that a note of that name, in the folder of this source, says have been compiled.
 
-    With the package come all kernels that there are (`packaging/ship_kernels.py`), without notes.
+    A package that came with kernels has all of them (`packaging/ship_kernels.py`) and needs no notes.
     """
     return (not _foreign and shipped_folder() is not None) or (cache_folder() / name).exists()
 

@@ -43,7 +43,7 @@ def allowed() -> int:
 
 
 class Outcome(NamedTuple):
-    """What a call has come to: what it returned, or the error that it raised."""
+    """What a call returned, or the error that it raised."""
 
     value: Any = None
     error: Exception | None = None
@@ -56,10 +56,10 @@ class Outcome(NamedTuple):
 
 
 def side_by_side(calls: Sequence[Callable[[], Any]], threads: int) -> list[Outcome]:
-    """Make calls on so many threads, of which this is one, in their order; back with what each has come to.
+    """Make calls on so many threads, of which this is one, taken in their order; returns the outcome of each.
 
-    Compiled code lets other threads run meanwhile, Python does not. An interrupt of this thread goes on once the calls
-    that have begun are over.
+    Compiled code lets other threads run meanwhile, Python does not. An interrupt of this thread (Ctrl-C) is raised once
+    the calls that have begun are over; the others are not made.
     """
     waiting = deque(enumerate(calls))
     found = [Outcome()] * len(calls)
@@ -91,7 +91,7 @@ def shared(kernel: Callable[..., None], threads: int, job: tuple[Any, ...]) -> N
     """Call kernel(*job) on so many threads, of which this is one; back when all calls are.
 
     The kernel takes pieces of the work by `taken` until there are none, so no result depends on how many threads there
-    are, and one that the system refuses is not missed. In kernels only; the kernel returns nothing.
+    are: where the system refuses one, the others do its work. In kernels only; the kernel returns nothing.
     """
     raise TypeError("kernels share work; Python calls them")
 

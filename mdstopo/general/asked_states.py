@@ -1,10 +1,10 @@
-"""What a weighted sum of rows and integrals asks of members, whatever they are: states, and what is virtual there.
+"""What a weighted sum of rows and integrals asks of members: states of the motion, with virtual changes of poses there.
 
 A member adds to the derivative a sum over states that knows of the motion only the relative pose of its two bodies with
 its rates, the virtual change of that pose, and the weight of the stored energy. These are few numbers: here they are
-written down for some pairs, of a member between which `candidate_prices` then forms the sum, whether it is built or
-not. States are all stages of the motion, then those of each row: the state it is read at, and the stages of the partial
-step that leads there where there is one.
+written down for some pairs. From them `candidate_prices` forms the sum of any member between the bodies of a pair,
+whether it is built or not. States are all stages of the motion, then those of each row: the state it is read at, and
+the stages of the partial step that leads there where there is one.
 """
 
 import numpy as np
@@ -181,7 +181,8 @@ def _ask_rows(
       model: the compiled scene.
       count: number of steps.
     In:
-      which (R, 2), rows (R, COLUMNS), factor (R,): the rows, and their weights.
+      which (R, 2): number of each row's response, and 0.
+      rows (R, COLUMNS), factor (R,): the rows, the latest first, and their weights.
       pairs (G,): the pairs.
     In place:
       member_state (3, columns): state of the members.

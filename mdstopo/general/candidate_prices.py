@@ -327,15 +327,18 @@ def _price_switching(model, asked, k, price):
 def _price_followed(model, asked, k, i, node, pieces):
     """What member i of a law that switches does in the steps of a run.
 
-    A step in which it stays in its mode counts by its stages, as for a member that is built. In one in which it leaves
-    it, the force of each mode times the member's part of the virtual change is integrated over the mode's piece, both
-    from their values at the nodes.
+    A step in which it stays in its mode is summed over its stages, as for a member that is built. In a step in which
+    its mode changes, the force of each mode times the member's part of the virtual change is integrated over the mode's
+    piece, both from their values at the nodes.
 
     In:
       model: with the members.
       asked, k, i: an `Asked`, the number of the run, and the member.
     Scratch:
-      node (NODE_ROWS, NODES), pieces (CHANGES + 1, PIECE).
+      node (NODE_ROWS, NODES): the member at the nodes of a step.
+      pieces (CHANGES + 1, PIECE): pieces of a step in which it stays in a mode.
+
+    Returns its part of the derivative by alpha.
     """
     run = asked.run[k]
     p = asked.law[k]
@@ -344,7 +347,7 @@ def _price_followed(model, asked, k, i, node, pieces):
     remembers = law_remembers(code)
     mode = np.int64(0)
     kept = 0.0
-    begun = run[FROM_START] == 0  # it has not acted, and begins as a member that is built does
+    begun = run[FROM_START] == 0  # a law that acts later begins in mode 0, unset
     total = 0.0
     pieces[0, PIECE_MODE] = 0.0
     pieces[0, PIECE_SET] = 0.0

@@ -50,20 +50,20 @@ class Integrals(NamedTuple):
         return Integrals(self.once + other.once, self.twice + length * self.once + other.twice)
 
 
-class Prescribing:
-    """A formula with the bits of its switches, called from Python. row (WIDTH,): as of `driven_par`."""
+class CalledFormula:
+    """A formula of time, called from Python, and its integrals. row (WIDTH,): as of `GeneralModel.driven_par`."""
 
     def __init__(self, row: FloatArray) -> None:
         self.row = row
         self._calls = FormulaCalls(row[ADDRESS], row)
 
     def at(self, time: float, mode: int) -> tuple[float, float]:
-        """Value and rate."""
+        """Value and rate at a time (s); mode: bits of its switches."""
         value, rate, *_ = self._calls.numbers(0.0, 0.0, time, 0.0, mode, VALUE)
         return self.row[SCALE] * value + self.row[OFFSET], self.row[SCALE] * rate
 
     def over(self, start: float, length: float, mode: int) -> Integrals:
-        """Over a stretch of time that begins at `start` and is so long."""
+        """The integrals over a stretch of time from `start` on (s), so long; mode: bits of its switches."""
         once = twice = 0.0
         for node, weight in zip(NODES, WEIGHTS, strict=True):
             value, _ = self.at(start + node * length, mode)
@@ -87,7 +87,7 @@ def integrated_ends(row: FloatArray, sides: IndexArray, times: FloatArray, posit
     times (n_seg + 1,): ends of the segments (s).
     position, rate: at the start, the rate of an acceleration.
     """
-    formula = Prescribing(row)
+    formula = CalledFormula(row)
     out = np.empty((len(times) - 1, 2, 2))
     for k, mode in enumerate(sides.tolist()):
         start, end = float(times[k]), float(times[k + 1])
@@ -109,7 +109,7 @@ def integration_times(case: Case, load_case: LoadCase, kinks: list[float]) -> li
     inside = [time for time in kinks if load_case.start < time < load_case.end]
     ends = np.array([load_case.start, *sorted(inside), load_case.end])
     for formula in _of_motions(load_case):
-        own = Prescribing(row_of_formula(formula))
+        own = CalledFormula(row_of_formula(formula))
         largest = Integrals(0.0, 0.0)
         cuts: list[float] = []
         for start, end, mode in zip(ends[:-1].tolist(), ends[1:].tolist(), modes(formula, ends).tolist(), strict=True):
