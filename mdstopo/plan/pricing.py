@@ -104,8 +104,8 @@ def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
     """The prices at a design (N,) with the largest gain of one as it is where the best candidates are built.
 
     Members of laws that switch have steps end at their switches where they are built; prices know no such steps, and so
-    differ a little. Of all that are not built here the gain is no more than what is told of the last one that is, and
-    the largest difference. Where the built ones cannot be compared, prices stay as they are.
+    differ a little. CONFIRMED of each group are built. Of those in `pairs` that are not, the best one counts with its
+    price and the largest difference that was found. Where the built ones cannot be evaluated, prices stay as they are.
     """
     problem = cast("DesignProblem", of)
     chosen = {name: (i[:CONFIRMED], j[:CONFIRMED]) for name, (i, j) in prices.pairs.items()}

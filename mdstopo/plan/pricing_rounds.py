@@ -28,7 +28,7 @@ MOST_ROUNDS = 200
 WORTH_A_ROUND = 0.1
 #: rounds in a row that lower it by less, after which the run ends: what gains to first order does not in fact
 PATIENCE = 3
-#: the largest gain, in tolerances, from which on prices of laws that switch are confirmed with members that are built
+#: the largest gain, in tolerances, up to which prices of laws that switch are confirmed with members that are built
 CLOSE = 10.0
 #: columns of the table of rounds in the file
 COLUMNS = ("members", "entered", "left", "objective", "best", "together", "residual", "level")
