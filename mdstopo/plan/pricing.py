@@ -38,9 +38,10 @@ class Prices:
     """What pricing has found at a design.
 
     seen: candidates. best: the largest gain of one, together: how much all of them may gain, relative to the
-    objective, to first order. pairs: those that are to enter, by group; gains: of these, the largest first. built (N,):
-    dL/dalpha of the members that are built, with the multipliers of rows and limits. residual: of the optimality
-    conditions of these members. rows (R + C,), linear (m,): these multipliers; gradients (R + C, N): of the rows.
+    objective, to first order. pairs: those that are to enter, by group; gains: of these, the largest first; left: the
+    largest gain of any other one, -inf where there is none. built (N,): dL/dalpha of the members that are built, with
+    the multipliers of rows and limits. residual: of the optimality conditions of these members. rows (R + C,), linear
+    (m,): these multipliers; gradients (R + C, N): of the rows.
     """
 
     seen: int
@@ -48,6 +49,7 @@ class Prices:
     together: float
     pairs: dict[str, Pairs]
     gains: dict[str, Floats]
+    left: dict[str, float]
     built: Floats
     residual: float
     rows: Floats
@@ -90,6 +92,7 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
     seen, best, together = 0, 0.0, 0.0
     pairs: dict[str, Pairs] = {}
     gains: dict[str, Floats] = {}
+    left: dict[str, float] = {}
     for group in case.priced_groups:
         found = evaluator.candidates_of(group, count).go_through(asked, _worth(case, group, linear), MOST)
         seen += found.seen + (len(group) if count is None else 0)
@@ -97,15 +100,16 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
         material = _material(case, group)
         together += (found.together if material is None else min(found.together, found.ratio * material)) / scale
         pairs[group.name], gains[group.name] = (found.i, found.j), found.gain / scale
-    return Prices(seen, best, together, pairs, gains, built, residual, rows, linear, gradients)
+        left[group.name] = found.left / scale
+    return Prices(seen, best, together, pairs, gains, left, built, residual, rows, linear, gradients)
 
 
 def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
     """The prices at a design (N,) with the largest gain of one as it is where the best candidates are built.
 
     Members of laws that switch have steps end at their switches where they are built; prices know no such steps, and so
-    differ a little. CONFIRMED of each group are built. Of those in `pairs` that are not, the best one counts with its
-    price and the largest difference that was found. Where the built ones cannot be evaluated, prices stay as they are.
+    differ a little. CONFIRMED of each group are built. Of all others the best one counts with its price and the largest
+    difference that was found. Where the built ones cannot be evaluated, prices stay as they are.
     """
     problem = cast("DesignProblem", of)
     chosen = {name: (i[:CONFIRMED], j[:CONFIRMED]) for name, (i, j) in prices.pairs.items()}
@@ -129,8 +133,8 @@ def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
         own = slopes[larger.group_slices[group.name]][np.searchsorted(known, i * len(group.to_local) + j)]
         exact, told = -group.upper * own / scale, prices.gains[group.name]
         best = max(best, float(exact.max(initial=0.0)))
-        if len(told) > len(exact):
-            best = max(best, float(told[len(exact)] + np.abs(exact - told[: len(exact)]).max(initial=0.0)))
+        others = max(float(told[len(exact) :].max(initial=-np.inf)), prices.left[group.name])
+        best = max(best, others + float(np.abs(exact - told[: len(exact)]).max(initial=0.0)))
     return replace(prices, best=best)
 
 

@@ -42,7 +42,8 @@ class Passed:
 
     seen: how many there are. best: the largest gain of one (of the objective, to first order, with alpha at its upper
     bound), together: the sum over all that gain; ratio: the largest gain for a unit of cost. i, j (K,), gain (K,):
-    those with the largest gains, largest first, though some may be below zero.
+    those with the largest gains, largest first, though some may be below zero. left: the largest gain of all others,
+    -inf where there are none.
     """
 
     seen: int
@@ -52,6 +53,7 @@ class Passed:
     i: IndexArray
     j: IndexArray
     gain: FloatArray
+    left: float
 
 
 class CandidatePass(ABC, Generic[A]):
@@ -92,16 +94,19 @@ class CandidatePass(ABC, Generic[A]):
         """
         tiles = self.tiles(asked, worth, self._by_tile())
         best = tiles[:, BEST]
-        chosen = np.argsort(-best, kind="stable")[:TILES]
+        by_gain = np.argsort(-best, kind="stable")
+        chosen = by_gain[:TILES]
         a, b, rank, gain = (np.concatenate(each) for each in zip(
             *(self._of_tile(asked, int(tile), worth) for tile in chosen), strict=True
         ))  # fmt: skip
         # of every tile some before more of any: neighbours are alike
         order = np.lexsort((-gain, rank // SHARE))[:most]
         order = order[np.argsort(-gain[order], kind="stable")]
+        left = np.append(np.delete(gain, order), best[by_gain[TILES:]]).max(initial=-np.inf)
         i, j = (self.chosen[0][a[order]], self.chosen[1][b[order]])[self.order]
         seen, together = int(tiles[:, SEEN].sum()), float(tiles[:, TOGETHER].sum())
-        return Passed(seen, max(float(best.max()), 0.0), together, float(tiles[:, RATIO].max()), i, j, gain[order])
+        largest, ratio = max(float(best.max()), 0.0), float(tiles[:, RATIO].max())
+        return Passed(seen, largest, together, ratio, i, j, gain[order], float(left))
 
     def common(self, worth: float) -> FloatArray:
         """(COMMON,) of what candidates have in common, without what belongs to a law; worth: of a unit of cost."""
