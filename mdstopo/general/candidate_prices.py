@@ -6,8 +6,8 @@ grids; here all of them are gone through, tile by tile, of which a few numbers a
 
 No step ends at a switch of a member of alpha = 0. So one whose law switches is followed through the steps by its
 elongation at some nodes of each. Where it leaves its mode within a step, the sum over stages, which is for smooth
-forces, gives way to an integral over the pieces: there the virtual change is the polynomial with the moments that the
-stages give.
+forces and energies, gives way to an integral over the pieces: there the virtual change, and the weight of the energy,
+are the polynomials with the moments that the stages give.
 """
 
 import math
@@ -59,9 +59,9 @@ BARYCENTRIC = np.array([1.0 / np.prod(c - np.delete(NODE, m)) for m, c in enumer
 #: points and weights of an integral over a piece of a step, as fractions of it (Gauss)
 GAUSS = 0.5 * np.array(np.polynomial.legendre.leggauss(5)) + np.array([[0.5], [0.0]])
 #: what is known of a member at the nodes: elongation, its rate, its second derivative; its part of the virtual change;
-#: the law's tabulated force
-X, RATE, SECOND, ALONG, LEVEL = range(5)
-NODE_ROWS = 5
+#: the law's tabulated force; the weight of its energy
+X, RATE, SECOND, ALONG, LEVEL, WEIGHT = range(6)
+NODE_ROWS = 6
 #: pieces of a step in which a member stays in a mode: the fraction at which one begins, the mode, the permanent set;
 #: how many changes are followed, and how often an interval with one in it is halved
 BEGIN, PIECE_MODE, PIECE_SET = range(3)
@@ -71,7 +71,7 @@ HALVINGS = 40
 #: arrays of states in `Asked`, and of steps and nodes
 ARRAYS = (
     "pose", "change", "push", "energy", "when", "level", "step", "step_time", "node_pose", "node_push", "node_change",
-    "node_level",
+    "node_level", "node_energy",
 )  # fmt: skip
 #: states of one pass over a tile, whose poses stay in the nearest cache
 AT_ONCE = 32
@@ -113,6 +113,7 @@ class Asked(NamedTuple):
         FloatArray, Field("n_node, n_free", "minus their virtual changes, by the fraction of the step")
     ]
     node_level: Annotated[FloatArray, Field("n_node", "the law's tabulated force (N)")]
+    node_energy: Annotated[FloatArray, Field("n_node", "the weight of the stored energy, by the fraction of the step")]
     first: Annotated[FloatArray, Field("n_scene, n_axis, n_first", "points of the one grid in their body's frame (m)")]
     second: Annotated[FloatArray, Field("n_scene, n_axis, n_second", "points of the other grid, likewise")]
     first_home: Annotated[FloatArray, Field("n_scene, n_axis, n_first", "the points of the one grid at the start (m)")]
@@ -328,8 +329,8 @@ def _price_followed(model, asked, k, i, node, pieces):
     """What member i of a law that switches does in the steps of a run.
 
     A step in which it stays in its mode is summed over its stages, as for a member that is built. In a step in which
-    its mode changes, the force of each mode times the member's part of the virtual change is integrated over the mode's
-    piece, both from their values at the nodes.
+    its mode changes, the force of each mode times the member's part of the virtual change, and the energy times its
+    weight, are integrated over the mode's piece, all from their values at the nodes.
 
     In:
       model: with the members.
@@ -380,17 +381,11 @@ def _price_followed(model, asked, k, i, node, pieces):
         pieces[0, PIECE_MODE] = mode
         pieces[0, PIECE_SET] = kept
         last = _follow(code, p, model.curves, rest, asked.step_time[s], node, pieces)
-        for o in range(step[FIRST_STAGE], step[LAST_STAGE]):
-            c = (asked.when[o] - asked.step_time[s, 0]) / asked.step_time[s, 1]
-            at = last
-            while at > 0 and pieces[at, BEGIN] > c:
-                at -= 1
-            now = int(pieces[at, PIECE_MODE])
-            worked, stored = _at_state(model, asked, code, p, i, o, now, pieces[at, PIECE_SET])
-            total += stored
-            if last == 0:
-                total += worked
-        if last > 0:
+        if last == 0:
+            for o in range(step[FIRST_STAGE], step[LAST_STAGE]):
+                worked, stored = _at_state(model, asked, code, p, i, o, mode, kept)
+                total += worked + stored
+        else:
             for at in range(last + 1):
                 end = pieces[at + 1, BEGIN] if at < last else 1.0
                 total += _over_piece(model, asked, code, p, rest, s, node, pieces[at], end)
@@ -423,7 +418,7 @@ def _at_state(model, asked, code, p, i, o, mode, kept):
 
 @kernel
 def _fill_nodes(model, asked, i, first, node):
-    """Elongation of member i, its two rates, and its part of the virtual change, at the nodes of a step.
+    """Elongation of member i, its two rates, its part of the virtual change, and the rest of `node`, at a step's nodes.
 
     model: with the members.
     asked, first: an `Asked`, and the number of the first node.
@@ -438,6 +433,7 @@ def _fill_nodes(model, asked, i, first, node):
         node[SECOND, m] = second_rate(model, i, r, asked.node_push[first + m]) if length > 0.0 else 0.0
         node[ALONG, m] = along
         node[LEVEL, m] = asked.node_level[first + m]
+        node[WEIGHT, m] = asked.node_energy[first + m]
 
 
 @kernel
@@ -520,7 +516,8 @@ def _follow(code, p, curves, rest, time, node, pieces):
 
 @kernel
 def _over_piece(model, asked, code, p, rest, s, node, piece, end):
-    """The integral of the force of a mode times the member's part of the virtual change, over the mode's piece.
+    """The integral over a mode's piece of its force times the member's part of the virtual change, and of its energy
+    times the weight of that.
 
     model: with the members.
     asked, s: an `Asked`, and the number of the step.
@@ -532,12 +529,12 @@ def _over_piece(model, asked, code, p, rest, s, node, piece, end):
     begin = piece[BEGIN]
     for g in range(GAUSS.shape[1]):
         c = begin + (end - begin) * GAUSS[0, g]
-        f, _, _, _, _ = law(
+        f, _, _, energy, _ = law(
             code, p, between_nodes(node[X], c) - piece[PIECE_SET], between_nodes(node[RATE], c),
             int(piece[PIECE_MODE]), asked.step_time[s, 0] + c * asked.step_time[s, 1],
             between_nodes(node[LEVEL], c), model.curves, rest,
         )  # fmt: skip
-        total += GAUSS[1, g] * f * between_nodes(node[ALONG], c)
+        total += GAUSS[1, g] * (f * between_nodes(node[ALONG], c) + energy * between_nodes(node[WEIGHT], c))
     return (end - begin) * total
 
 

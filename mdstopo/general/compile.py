@@ -175,10 +175,12 @@ def _refuse_impacts(case: Case, load_case: LoadCase, bodies: Kinematics, made: D
     c = drive[:-1]
     reached = c[..., 0] + h * (c[..., 1] + h * (c[..., 2] + h * c[..., 3]))
     leap = np.abs(drive[1:, :, 0] - reached)
-    extent = np.abs(drive[:, :, 0]).max(axis=0, initial=0.0) + 1e-300
+    # what rounding is relative to; at all ends of segments they may be zero
+    steps = np.diff(times)[:, None, None] ** np.arange(4)
+    extent = np.abs(steps * drive[..., :4]).max(axis=(0, 2), initial=0.0) + 1e-300
     before = c[..., 1] + h * (2.0 * c[..., 2] + 3.0 * h * c[..., 3])
     jump = np.abs(drive[1:, :, 1] - before)
-    size = np.abs(drive[:, :, 1]).max(axis=0, initial=0.0) + 1e-300
+    size = np.abs(steps[..., :3] * drive[..., 1:4]).max(axis=(0, 2), initial=0.0) + 1e-300
     mistakes = []
     for i, d in enumerate(driven.tolist()):
         name = names[d // bodies.freedoms]

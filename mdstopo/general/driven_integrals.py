@@ -6,6 +6,7 @@ end where it needs them to, beside its kinks and jumps.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -48,6 +49,10 @@ class Integrals(NamedTuple):
     def and_then(self, other: Integrals, length: float) -> Integrals:
         """Both stretches one after the other; length: of the other one (s)."""
         return Integrals(self.once + other.once, self.twice + length * self.once + other.twice)
+
+    def or_larger(self, other: Integrals) -> Integrals:
+        """The larger of each, other's by its magnitude."""
+        return Integrals(max(self.once, abs(other.once)), max(self.twice, abs(other.twice)))
 
 
 class CalledFormula:
@@ -114,19 +119,21 @@ def integration_times(case: Case, load_case: LoadCase, kinks: list[float]) -> li
         cuts: list[float] = []
         for start, end, mode in zip(ends[:-1].tolist(), ends[1:].tolist(), modes(formula, ends).tolist(), strict=True):
             whole = own.over(start, end - start, mode)
-            largest = Integrals(max(largest.once, abs(whole.once)), max(largest.twice, abs(whole.twice)))
-            open_pieces = [(start, end, whole)]
+            largest = largest.or_larger(whole)
+            # the longest pieces first: what a pulse comes to is known before its tails are cut for nothing
+            open_pieces = deque([(start, end, whole)])
             while open_pieces:
-                low, high, whole = open_pieces.pop()
+                low, high, whole = open_pieces.popleft()
                 middle = 0.5 * (low + high)
                 first, last = own.over(low, middle - low, mode), own.over(middle, high - middle, mode)
+                largest = largest.or_larger(first).or_larger(last)
                 if _are_alike(whole, first.and_then(last, high - middle), largest) or not low < middle < high:
                     continue
                 if len(cuts) == MOST_CUTS:
                     message = f"the expression {formula.text} changes too fast at t = {low:.6g} s to be integrated"
                     raise CaseError([mistake_of(case, load_case, "motions", message)], str(case.path or case.name))
                 cuts.append(middle)
-                open_pieces += [(middle, high, last), (low, middle, first)]
+                open_pieces += [(low, middle, first), (middle, high, last)]
         found += cuts
     return found
 

@@ -254,6 +254,7 @@ class _Run(NamedTuple):
     node_push: FloatArray
     node_change: FloatArray
     node_level: FloatArray
+    node_energy: FloatArray
 
 
 def _run_of(scene: AskedOfScene, k: int, record: Law) -> _Run:
@@ -294,7 +295,7 @@ class Steps(NamedTuple):
     """The steps of a motion, in the order in which members that switch go through them, each with its nodes.
 
     step (K, 5), step_time (K, 2): as of `candidate_prices.Asked`. segment (K,): in which each is.
-    pose (nodes, G, POSE), push, change (nodes, G, D): at the nodes.
+    pose (nodes, G, POSE), push, change (nodes, G, D), energy (nodes,): at the nodes.
     """
 
     step: IndexArray
@@ -303,6 +304,7 @@ class Steps(NamedTuple):
     pose: FloatArray
     push: FloatArray
     change: FloatArray
+    energy: FloatArray
 
 
 def steps_of(driver: "GeneralDriver", asked: AskedOfScene, index: IndexArray, rows: FloatArray) -> Steps:
@@ -336,28 +338,31 @@ def steps_of(driver: "GeneralDriver", asked: AskedOfScene, index: IndexArray, ro
     (q, out), _, _ = driver.sample_response(-1, places, False, count)
     pose, push = np.zeros((len(places), *asked.pose.shape[1:])), np.zeros((len(places), *asked.push.shape[1:]))
     keep_states(driver.ints, driver.floats, q, out[0], out[1], np.array(list(asked.pairs), dtype=np.int64), pose, push)
-    change = [_between_stages(asked, slice(*where[:2]), *time) for (_, where, time, _) in found]
+    change, energy = (
+        [_between_stages(values, asked.when, slice(*where[:2]), *time) for (_, where, time, _) in found]
+        for values in (asked.change, asked.energy)
+    )
     return Steps(
         np.array(step, dtype=np.int64).reshape(-1, 5), times, asked.segment[[each[0] for each in step]], pose, push,
-        np.concatenate(change),
+        np.concatenate(change), np.concatenate(energy),
     )  # fmt: skip
 
 
-def _between_stages(asked: AskedOfScene, stages: slice, begin: float, length: float) -> FloatArray:
-    """What the virtual changes of pairs are at the nodes of a step, by the fraction of the step, (NODES, G, D).
+def _between_stages(values: FloatArray, when: FloatArray, stages: slice, begin: float, length: float) -> FloatArray:
+    """What sums over the stages of a step are sums of, at the nodes of the step, by its fraction, (NODES, ...).
 
     It is the polynomial with the same moments: sums over stages of what is smooth in time are exact to a high order.
-    asked, stages: states, and which of them are the step's. begin, length: of the step (s).
+    values (T, ...): of states: virtual changes of pairs, or weights of the energy. when (T,): their times (s).
+    stages: which of them are the step's. begin, length: of the step (s).
     """
-    change = asked.change[stages]
-    if length <= 0.0 or not change.any():
-        return np.zeros((NODES, *change.shape[1:]))
-    degree = HIGHEST if len(change) >= MANY else min(len(change) - 1, HIGHEST - 1)
-    fraction = (asked.when[stages] - begin) / length
+    own = values[stages]
+    if length <= 0.0 or not own.any():
+        return np.zeros((NODES, *own.shape[1:]))
+    degree = HIGHEST if len(own) >= MANY else min(len(own) - 1, HIGHEST - 1)
+    fraction = (when[stages] - begin) / length
     at_stages = np.polynomial.legendre.legvander(2.0 * fraction - 1.0, degree)
     at_nodes = np.polynomial.legendre.legvander(2.0 * NODE - 1.0, degree) * (2.0 * np.arange(degree + 1) + 1.0)
-    moments = np.einsum("jm,jgd->mgd", at_stages, change)
-    found: FloatArray = np.einsum("nm,mgd->ngd", at_nodes, moments)
+    found: FloatArray = np.tensordot(at_nodes @ at_stages.T, own, axes=1)
     return found
 
 
@@ -370,12 +375,13 @@ def _steps_of_law(steps: Steps, model: GeneralModel, k: int, pair: int) -> tuple
     time = steps.step_time[acts]
     when = (time[:, :1] + time[:, 1:] * NODE).ravel()
     level = _level(model, k, np.repeat(steps.segment[acts], NODES), when)
-    return step, time, steps.pose[nodes, pair], steps.push[nodes, pair], steps.change[nodes, pair], level
+    kept = steps.pose[nodes, pair], steps.push[nodes, pair], steps.change[nodes, pair]
+    return step, time, *kept, level, steps.energy[nodes]
 
 
 def _no_steps(pose: int, freedoms: int) -> tuple[Any, ...]:
     """No steps and nodes, as of `_Run`; pose, freedoms: numbers of a pose and of its change."""
-    nodes = np.zeros((0, pose)), np.zeros((0, freedoms)), np.zeros((0, freedoms)), np.zeros(0)
+    nodes = np.zeros((0, pose)), np.zeros((0, freedoms)), np.zeros((0, freedoms)), np.zeros(0), np.zeros(0)
     return np.zeros((0, 5), dtype=np.int64), np.zeros((0, 2)), *nodes
 
 

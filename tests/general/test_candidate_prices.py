@@ -163,6 +163,8 @@ SWITCHED = {
     "clipped": arm({"type": "gap", "stiffness": 900, "gap": 0.02, "damping": 30, "clip": True}, **ENERGY),
     "crushed": arm({"type": "crush", "stiffness": 9000, "force": 40}, **looked(PULL, "max")),
     "crushed later": arm({"type": "crush", "stiffness": 9000, "force": 40, "active_from": 0.1}),
+    "slack, mean energy": arm({"type": "gap", "stiffness": 900, "gap": 0.02}, **looked("energy", "mean")),
+    "slack, root mean square energy": arm({"type": "gap", "stiffness": 900, "gap": 0.02}, **looked("energy", "rms")),
     "kinked formula": arm({"type": "expression", "force": "k*max(x - 0.02, 0)", "parameters": {"k": 500}}),
     "slack in space": in_space({"type": "gap", "stiffness": 900, "gap": 0.01}),
     "crushed in space": in_space({"type": "crush", "stiffness": 9000, "force": 40}, **ENERGY),

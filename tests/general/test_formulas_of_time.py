@@ -12,6 +12,7 @@ from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.case.signals import combined
+from mdstopo.general.driven_integrals import integrated_ends, integration_times, row_of_motion
 from tests.variables.support import differences
 
 PLANE = """
@@ -253,6 +254,23 @@ def test_a_motion_by_its_velocity_or_its_acceleration_is_the_integral(kind: str)
     moved = TimeFormula(position, tuple(values.items())).at(1.0) - 0.1
     for each in found:
         assert each.objectives["X"] == pytest.approx(moved, rel=1e-12)
+
+
+def test_a_short_pulse_of_the_velocity_moves_a_body_by_its_integral() -> None:
+    case = read_case(DRIVEN.replace("position: POSITION", "velocity: 'exp(-((t - 0.333)/0.0005)^2)'"))
+    signal = case.load_cases[0].motions[0].x.signal
+    assert isinstance(signal, TimeFormula)
+    ends = np.array([0.0, *sorted(integration_times(case, case.load_cases[0], [])), 1.0])
+    row = row_of_motion(signal, "velocity")
+    moved = integrated_ends(row, np.zeros(len(ends) - 1, dtype=np.int64), ends, 0.0, 0.0)[-1, 1, 0]
+    assert abs(moved - 0.0005 * np.sqrt(np.pi)) < 1e-16
+
+
+def test_a_motion_that_is_back_at_zero_at_all_ends_of_segments_does_not_jump() -> None:
+    text = DRIVEN.replace("joints: [{type: revolute, bodies: [cart, load], at: [0.1, 0]}]\n", "")
+    text = text.replace("position: [0.1, 0]}", "position: [0, 0]}")
+    states = mdstopo.simulate(read_case(text.replace("position: POSITION", "velocity: 'cos(2*pi*t)'")))
+    assert states.status.ok
 
 
 def test_in_space_a_turn_by_its_rate_is_the_integral() -> None:
