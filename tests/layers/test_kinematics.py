@@ -31,6 +31,7 @@ STRIDE = re.compile(
 NO_STRIDES = {
     ("accelerations.py", "3 * model.size[1] + 1"): "a banded matrix with room for its pivots",
     ("candidate_prices.py", "range(3)"): "names of columns",
+    ("candidate_prices.py", "range(6)"): "names of columns",
     ("compile.py", "reshape(-1, 6)"): "columns of a response",
     ("general_driver.py", "np.zeros((1, 3))"): "a response, its rate and its member",
     ("general_driver.py", "reshape(events, 6)"): "columns of an event",
