@@ -16,7 +16,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, STIFF
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
-from mdstopo.compiler.threads import Outcome, allowed, side_by_side
+from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
 from mdstopo.integrators.scene_driver import DriverOptions, Method, ResponseResult, Scene, SceneDriver, SceneFamily
@@ -174,7 +174,7 @@ class Evaluator:
             if too_coarse:
                 status, message = Status.STEP_TOO_LARGE, too_coarse
                 break
-            result = begun[name].taken() if begun else self._timed(name, driver, design, exact, rows)
+            result = begun[name].result() if begun else self._timed(name, driver, design, exact, rows)
             status, diagnosis = result.status, ""
             if not status.ok or result.meeting >= 0 or result.unresolved >= 0:
                 status, diagnosis = self._verdict(name, design, result)
@@ -200,7 +200,7 @@ class Evaluator:
             status = Status.NO_GRADIENT
         return self._evaluation(looked, gradient, work_named(_total(work)), status, message)
 
-    def _side_by_side(self, design: FloatArray, exact: bool, rows: Rows) -> dict[str, Outcome]:
+    def _side_by_side(self, design: FloatArray, exact: bool, rows: Rows) -> dict[str, CallOutcome]:
         """Outcomes of all load cases by name, evaluated side by side on threads; empty where that does not pay.
 
         The first evaluation with gradients and the first one without take one load case after the other: either may

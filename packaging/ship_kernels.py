@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 import time
+from argparse import ArgumentParser
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from inspect import signature
@@ -241,7 +242,13 @@ def main(destination: Path) -> int:
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "--share":
-        compile_share(sys.argv[2])
+    parser = ArgumentParser(description="Compile all entries of the package for a wheel.")
+    parser.add_argument("folder", type=Path, nargs="?", help="where the machine code is put")
+    parser.add_argument("--share", choices=(SPACE, REST), help="compile a share for this process's processor only")
+    asked = parser.parse_args()
+    if asked.share:
+        compile_share(asked.share)
+    elif asked.folder:
+        sys.exit(main(asked.folder.resolve()))
     else:
-        sys.exit(main(Path(sys.argv[1]).resolve()))
+        parser.error("name a folder")

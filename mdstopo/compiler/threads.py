@@ -42,27 +42,27 @@ def allowed() -> int:
     return int(asked)
 
 
-class Outcome(NamedTuple):
+class CallOutcome(NamedTuple):
     """What a call returned, or the error that it raised."""
 
     value: Any = None
     error: Exception | None = None
 
-    def taken(self) -> Any:
+    def result(self) -> Any:
         """The value; raises the error."""
         if self.error is not None:
             raise self.error
         return self.value
 
 
-def side_by_side(calls: Sequence[Callable[[], Any]], threads: int) -> list[Outcome]:
+def side_by_side(calls: Sequence[Callable[[], Any]], threads: int) -> list[CallOutcome]:
     """Make calls on so many threads, of which this is one, taken in their order; returns the outcome of each.
 
     Compiled code lets other threads run meanwhile, Python does not. An interrupt of this thread (Ctrl-C) is raised once
     the calls that have begun are over; the others are not made.
     """
     waiting = deque(enumerate(calls))
-    found = [Outcome()] * len(calls)
+    found = [CallOutcome()] * len(calls)
 
     def work() -> None:
         while waiting:
@@ -71,9 +71,9 @@ def side_by_side(calls: Sequence[Callable[[], Any]], threads: int) -> list[Outco
             except IndexError:  # another thread has taken the last one
                 return
             try:
-                found[place] = Outcome(call())
+                found[place] = CallOutcome(call())
             except Exception as error:
-                found[place] = Outcome(error=error)
+                found[place] = CallOutcome(error=error)
 
     others = [Thread(target=copy_context().run, args=(work,)) for _ in range(min(threads, len(calls)) - 1)]
     for other in others:

@@ -17,6 +17,7 @@ from mdstopo.general.accelerations import (
     solve_accelerations,
     solve_unknowns,
 )
+from mdstopo.general.extremes import FRACTION, RATE, STEP, WHO
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.method_interface import point_of, step_back, weights_of
@@ -181,8 +182,8 @@ def state_of_row(tag, model, tables, member_state, history, count, row, workspac
 
     Returns the step that the state is an end of or in (-1: the start).
     """
-    k = int(row[2])
-    c = row[3]
+    k = int(row[STEP])
+    c = row[FRACTION]
     if c > 0.0 and c < 1.0:
         return point_of(tag, model, tables, member_state, history, count, k, c, np.bool_(True), workspace, q, v, work)
     copy_vector(history.q[k if c <= 0.0 else k + 1], q)
@@ -223,19 +224,19 @@ def row_cotangents(
     lam = np.empty(n_row)
     row_bar = np.empty(n_row)
     out[:] = 0.0
-    k = int(row[2])
-    c = row[3]
+    k = int(row[STEP])
+    c = row[FRACTION]
     segment = history.index[k, SEGMENT]
     w = state_of_row(tag, model, tables, member_state, history, count, row, workspace, q, v, work)
     t = history.t[k] + c * (history.t[k + 1] - history.t[k])
     restore_modes(history, history.index[k, EVENTS], member_state)
-    rate = row[4]
+    rate = row[RATE]
     if across:
         at_end = c <= 0.0 or c >= 1.0  # a row inside a step needs no rate
         rate = across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, a, lam) if at_end else 0.0
     solve_accelerations(model, member_state, segment, t, q, v, np.bool_(True), workspace, a, lam)
     work[FORCES] += 1
-    who = int(row[6])
+    who = int(row[WHO])
     if across:
         across_slopes(model, j, q, v, a, lam, bars, row_bar)
     else:

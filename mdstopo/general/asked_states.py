@@ -12,6 +12,7 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents, state_of_row, sweep
+from mdstopo.general.extremes import FRACTION, STEP, WHO
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import count_sets
 from mdstopo.general.responses import design_slopes, energy_weight
@@ -50,7 +51,7 @@ def ask_members(
     padded,
     pose,
     change,
-    push,
+    pose_a,
     energy,
     when,
     segment,
@@ -73,8 +74,8 @@ def ask_members(
       room, room_ints: flat arrays of the history of steps (`carve_history`); partial steps are kept behind it.
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     Out; all of the states, of which there are the stages and OF_A_ROW for each row, zeros before the call:
-      pose (T, G, POSE), change (T, G, D), push (T, G, D): relative poses, minus their virtual changes, and their second
-        derivatives in time.
+      pose (T, G, POSE), change (T, G, D), pose_a (T, G, D): relative poses, minus their virtual changes, and their
+        second derivatives in time.
       energy (T,), when (T,), segment (T,): weight of the stored energy; time (s), and the segment of it, which is not
         touched where there is no state.
       padded (R or 1, M_padded + P): scratch.
@@ -83,7 +84,7 @@ def ask_members(
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
     workspace = make_workspace(model)
-    states = pose, push, when, segment
+    states = pose, pose_a, when, segment
     for w in range(count):
         for o in range(history.index[w, FIRST], history.index[w + 1, FIRST]):
             _keep_stage(model, history, o, history.index[w, SEGMENT], pairs, states, o)
@@ -95,12 +96,12 @@ def ask_members(
     for k in range(integrals.shape[0]):
         _ask_integral(
             tag, model, tables, member_state, history, count, integrals[k, 0], integrals[k, 1] != 0, share[k],
-            workspace, pairs, states, change, energy, padded[0], work,
+            workspace, pairs, change, energy, padded[0], work,
         )  # fmt: skip
 
 
 @entry
-def keep_states(ints, floats, q, v, a, pairs, pose, push):
+def keep_states(ints, floats, q, v, a, pairs, pose, pose_a):
     """Relative poses of pairs at states, and their second derivatives in time.
 
     In:
@@ -108,10 +109,10 @@ def keep_states(ints, floats, q, v, a, pairs, pose, push):
       q (T, n_q), v, a (T, n): coordinates, velocities, accelerations.
       pairs (G,): the pairs.
     Out:
-      pose (T, G, POSE), push (T, G, D): set.
+      pose (T, G, POSE), pose_a (T, G, D): set.
     """
     model = unpack_general(ints, floats)
-    states = pose, push, np.empty(q.shape[0]), np.empty(q.shape[0], np.int64)
+    states = pose, pose_a, np.empty(q.shape[0]), np.empty(q.shape[0], np.int64)
     for i in range(q.shape[0]):
         _keep(model, q[i], v[i], a[i], 0.0, np.int64(0), pairs, states, i)
 
@@ -141,12 +142,12 @@ def _keep(model, q, v, a, t, segment, pairs, states, at):
     states: poses, second derivatives, times and segments, as of `ask_members`.
     at: the number of the state.
     """
-    pose, push, when, segments = states
+    pose, pose_a, when, segments = states
     rel = np.empty((model.pair.shape[0], pose_size(model)))
     relative_pose(model, q, v, rel)
     for g in range(pairs.shape[0]):
         copy_vector(rel[pairs[g]], pose[at, g])
-        pose_acceleration(model, rel, pairs[g], a, push[at, g])
+        pose_acceleration(model, rel, pairs[g], a, pose_a[at, g])
     when[at] = t
     segments[at] = segment
 
@@ -284,22 +285,22 @@ def _keep_row(
     v = np.empty(n)
     a = np.empty(n)
     lam = np.empty(model.size[0])
-    k = int(row[2])
+    k = int(row[STEP])
     segment = history.index[k, SEGMENT]
     state_of_row(tag, model, tables, member_state, history, count, row, workspace, q, v, work)
-    t = history.t[k] + row[3] * (history.t[k + 1] - history.t[k])
+    t = history.t[k] + row[FRACTION] * (history.t[k + 1] - history.t[k])
     restore_modes(history, history.index[k, EVENTS], member_state)
     solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
     _keep(model, q, v, a, t, segment, pairs, states, at)
     _add_change(model, q, v, z, factor, pairs, change)
-    slopes = design_slopes(model, member_state, segment, j, int(row[6]), t, q, v, a, lam, workspace)
+    slopes = design_slopes(model, member_state, segment, j, int(row[WHO]), t, q, v, a, lam, workspace)
     return energy_weight(model, j, slopes)
 
 
 @kernel
 def _ask_integral(
-    tag, model, tables, member_state, history, count, j, square, factor, workspace, pairs, states, change, energy,
-    scratch, work,
+    tag, model, tables, member_state, history, count, j, square, factor, workspace, pairs, change, energy, scratch,
+    work,
 ):  # fmt: skip
     """What an integral asks, as `ask_members` has it.
 
@@ -313,7 +314,7 @@ def _ask_integral(
     In place:
       member_state (3, columns): state of the members.
     Out:
-      states: not touched. change (T, G, D), energy (T,): added to.
+      change (T, G, D), energy (T,): added to.
       workspace: workspace of a balance (`accelerations.Workspace`).
       scratch (M_padded + P,). work (WORK,): counts of work, added to.
     """

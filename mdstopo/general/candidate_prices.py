@@ -70,7 +70,7 @@ CHANGES = 4
 HALVINGS = 40
 #: arrays of states in `Asked`, and of steps and nodes
 ARRAYS = (
-    "pose", "change", "push", "energy", "when", "level", "step", "step_time", "node_pose", "node_push", "node_change",
+    "pose", "change", "pose_a", "energy", "when", "level", "step", "step_time", "node_pose", "node_a", "node_change",
     "node_level", "node_energy",
 )  # fmt: skip
 #: states of one pass over a tile, whose poses stay in the nearest cache
@@ -94,7 +94,7 @@ class Asked(NamedTuple):
     curves: Annotated[FloatArray, Field("n_scene, n_curve", "numbers of the scene's laws")]
     pose: Annotated[FloatArray, Field("n_state, 1, n_pose", "relative pose of the group's bodies, and its rates")]
     change: Annotated[FloatArray, Field("n_state, 1, n_free", "minus the virtual change of the pose")]
-    push: Annotated[FloatArray, Field("n_state, n_free", "second derivative of the pose in time")]
+    pose_a: Annotated[FloatArray, Field("n_state, n_free", "second derivative of the pose in time")]
     energy: Annotated[FloatArray, Field("n_state", "weight of the stored energy")]
     when: Annotated[FloatArray, Field("n_state", "time (s)")]
     level: Annotated[FloatArray, Field("n_state", "the law's tabulated force (N)")]
@@ -108,7 +108,7 @@ class Asked(NamedTuple):
     ]
     step_time: Annotated[FloatArray, Field("n_step, 2", "when it begins, and how long it is (s)")]
     node_pose: Annotated[FloatArray, Field("n_node, n_pose", "relative poses at NODE of each step, and their rates")]
-    node_push: Annotated[FloatArray, Field("n_node, n_free", "their second derivatives")]
+    node_a: Annotated[FloatArray, Field("n_node, n_free", "their second derivatives")]
     node_change: Annotated[
         FloatArray, Field("n_node, n_free", "minus their virtual changes, by the fraction of the step")
     ]
@@ -300,7 +300,7 @@ def _price_run(model, asked, k, row, member_state, price):
         if elastic and has_spring_energies(model):
             spring_energies(model, p, np.int64(0), np.int64(PLACES), pose[s : s + 1], np.int64(0), weight, price)
         elif code == INERTER:
-            _add_inertial(model, p[0], pose[s, 0], change[s, 0], asked.push[s], price)
+            _add_inertial(model, p[0], pose[s, 0], change[s, 0], asked.pose_a[s], price)
         else:
             member_designs(
                 model, code, p, np.int64(0), np.int64(PLACES), asked.when[s], asked.level[s], member_state,
@@ -363,7 +363,7 @@ def _price_followed(model, asked, k, i, node, pieces):
             now = int(pieces[last, PIECE_MODE])
             own = pieces[last, PIECE_SET]
             if not begun or not remembers:
-                second = second_rate(model, i, asked.pose[o, 0], asked.push[o])
+                second = second_rate(model, i, asked.pose[o, 0], asked.pose_a[o])
                 now = law_start(code, p, x, rate, second, asked.when[o], model.curves, rest)
                 own = law_first_set(code, p, x, now)
             worked, stored = _at_state(model, asked, code, p, i, o, now, own)
@@ -430,7 +430,7 @@ def _fill_nodes(model, asked, i, first, node):
         _, _, along = member_work(model, i, r, asked.node_change[first + m])
         node[X, m] = x
         node[RATE, m] = rate
-        node[SECOND, m] = second_rate(model, i, r, asked.node_push[first + m]) if length > 0.0 else 0.0
+        node[SECOND, m] = second_rate(model, i, r, asked.node_a[first + m]) if length > 0.0 else 0.0
         node[ALONG, m] = along
         node[LEVEL, m] = asked.node_level[first + m]
         node[WEIGHT, m] = asked.node_energy[first + m]

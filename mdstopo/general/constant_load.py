@@ -9,6 +9,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import joint_slopes, make_workspace, solve_accelerations
+from mdstopo.general.extremes import FRACTION, STEP, WHO
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, explicit_part, force_sign
 from mdstopo.general.members import unscale_general
@@ -70,9 +71,9 @@ def hold(
     lam = np.empty(n_row)
     row_bar = np.empty(n_row)
     bars = np.empty((3, n))
-    k = int(row[2])
-    c = row[3]
-    who = int(row[6])
+    k = int(row[STEP])
+    c = row[FRACTION]
+    who = int(row[WHO])
     segment = history.index[k, SEGMENT]
     if c <= 0.0 or c >= 1.0:
         copy_vector(history.q[k if c <= 0.0 else k + 1], q)

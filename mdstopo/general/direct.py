@@ -10,6 +10,7 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
+from mdstopo.general.extremes import COLUMNS, FRACTION, STEP, WHO
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import MODE, SCALE, SET, level_of, unscale_general
 from mdstopo.general.method_interface import step_forward
@@ -680,13 +681,13 @@ def follow(
         other = unpack_general(ints, shifted[b, 1])
         for d in range(n):
             column[column.shape[0] - numbers + b, n + d] = (one.v0[d] - other.v0[d]) / apart[b]
-    row = np.zeros(7)
+    row = np.zeros(COLUMNS)
     place = 0
     for k in range(count + 1):
         if place == at.shape[0]:
             break
-        row[2] = max(k - 1, 0)
-        row[3] = 1.0 if k > 0 else 0.0
+        row[STEP] = max(k - 1, 0)
+        row[FRACTION] = 1.0 if k > 0 else 0.0
         if k > 0 and slots == 0 and not with_alpha:
             numbers_alone(
                 tag, model, ints, shifted, apart, tables, member_state, history, k - 1, workspace, column, force,
@@ -702,7 +703,7 @@ def follow(
             )
         while place < at.shape[0] and at[place] == k:
             for r in range(looked.shape[0]):
-                row[6] = who[r, place]
+                row[WHO] = who[r, place]
                 row_cotangents(
                     tag,
                     model,
@@ -725,8 +726,8 @@ def follow(
                     for m in range(slots):
                         padded[i] += bar_set[m] * sets[m, i]
                 if numbers > 0:
-                    segment = history.index[int(row[2]), SEGMENT]
-                    restore_modes(history, history.index[int(row[2]), EVENTS], member_state)
+                    segment = history.index[int(row[STEP]), SEGMENT]
+                    restore_modes(history, history.index[int(row[STEP]), EVENTS], member_state)
                     q, v = history.q[k].copy(), history.v[k].copy()
                     no = np.bool_(False)
                     solve_accelerations(model, member_state, segment, history.t[k], q, v, no, workspace, a, lam)

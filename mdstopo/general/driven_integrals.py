@@ -114,28 +114,41 @@ def integration_times(case: Case, load_case: LoadCase, kinks: list[float]) -> li
     inside = [time for time in kinks if load_case.start < time < load_case.end]
     ends = np.array([load_case.start, *sorted(inside), load_case.end])
     for formula in _of_motions(load_case):
-        own = CalledFormula(row_of_formula(formula))
-        largest = Integrals(0.0, 0.0)
-        cuts: list[float] = []
-        for start, end, mode in zip(ends[:-1].tolist(), ends[1:].tolist(), modes(formula, ends).tolist(), strict=True):
-            whole = own.over(start, end - start, mode)
-            largest = largest.or_larger(whole)
-            # the longest pieces first: what a pulse comes to is known before its tails are cut for nothing
-            open_pieces = deque([(start, end, whole)])
-            while open_pieces:
-                low, high, whole = open_pieces.popleft()
-                middle = 0.5 * (low + high)
-                first, last = own.over(low, middle - low, mode), own.over(middle, high - middle, mode)
-                largest = largest.or_larger(first).or_larger(last)
-                if _are_alike(whole, first.and_then(last, high - middle), largest) or not low < middle < high:
-                    continue
-                if len(cuts) == MOST_CUTS:
-                    message = f"the expression {formula.text} changes too fast at t = {low:.6g} s to be integrated"
-                    raise CaseError([mistake_of(case, load_case, "motions", message)], str(case.path or case.name))
-                cuts.append(middle)
-                open_pieces += [(low, middle, first), (middle, high, last)]
+        cuts = _cuts(CalledFormula(row_of_formula(formula)), ends, modes(formula, ends))
+        if len(cuts) > MOST_CUTS:
+            message = (
+                f"the expression {formula.text} changes too fast at t = {cuts[-1]:.6g} s to be integrated: {MOST_CUTS} "
+                "pieces of time are not enough"
+            )
+            raise CaseError([mistake_of(case, load_case, "motions", message)], str(case.path or case.name))
         found += cuts
     return found
+
+
+def _cuts(formula: CalledFormula, ends: FloatArray, sides: IndexArray) -> list[float]:
+    """Where segments have to be cut for the integrals of a formula over the pieces; one more than MOST_CUTS: too often.
+
+    ends (n_seg + 1,): of segments (s); sides (n_seg,): bits of the formula's switches in them.
+    """
+    cuts: list[float] = []
+    largest = Integrals(0.0, 0.0)
+    for start, end, mode in zip(ends[:-1].tolist(), ends[1:].tolist(), sides.tolist(), strict=True):
+        whole = formula.over(start, end - start, mode)
+        largest = largest.or_larger(whole)
+        # the longest pieces first: what a pulse comes to is known before its tails are cut for nothing
+        waiting = deque([(start, end, whole)])
+        while waiting:
+            low, high, whole = waiting.popleft()
+            middle = 0.5 * (low + high)
+            first, last = formula.over(low, middle - low, mode), formula.over(middle, high - middle, mode)
+            largest = largest.or_larger(first).or_larger(last)
+            if _are_alike(whole, first.and_then(last, high - middle), largest) or not low < middle < high:
+                continue
+            cuts.append(middle)
+            if len(cuts) > MOST_CUTS:
+                return cuts
+            waiting += [(low, middle, first), (middle, high, last)]
+    return cuts
 
 
 def _are_alike(whole: Integrals, halves: Integrals, largest: Integrals) -> bool:

@@ -48,7 +48,7 @@ class AskedOfScene(NamedTuple):
     pairs: dict[int, int]
     pose: FloatArray
     change: FloatArray
-    push: FloatArray
+    pose_a: FloatArray
     energy: FloatArray
     when: FloatArray
     segment: IndexArray
@@ -85,17 +85,17 @@ def asked_of(driver: "GeneralDriver", factor: FloatArray) -> AskedOfMembers:
     size = driver.scene.kinematics
     states, each = int(index[count, FIRST]) + OF_A_ROW * len(asked.rows), size.freedoms
     pose = np.zeros((states, len(pairs), size.pose_size))
-    change, push = np.zeros((2, states, len(pairs), each))
+    change, pose_a = np.zeros((2, states, len(pairs), each))
     energy, when, segment = np.zeros(states), np.zeros(states), np.full(states, -1)
     scratch = np.zeros((max(len(asked.rows), 1), len(driver.padded)))
     arguments: tuple[Any, ...] = (
         *driver.steps_arguments(count)[:4], driver.limits, count, *asked, np.array(list(pairs), dtype=np.int64),
-        driver.room, driver.room_ints, driver.member_state, scratch, pose, change, push, energy, when, segment,
+        driver.room, driver.room_ints, driver.member_state, scratch, pose, change, pose_a, energy, when, segment,
         driver.work,
     )  # fmt: skip
     ask_members(*arguments)
     numbers = {pair: number for number, pair in enumerate(pairs)}
-    own = AskedOfScene(driver.case, driver.scene, model, numbers, pose, change, push, energy, when, segment, None)
+    own = AskedOfScene(driver.case, driver.scene, model, numbers, pose, change, pose_a, energy, when, segment, None)
     if any(_switches(law) for group in driver.case.priced_groups for law in group.laws):
         own = own._replace(steps=steps_of(driver, own, index, asked.rows))
     return AskedOfMembers((own,))
@@ -244,14 +244,14 @@ class _Run(NamedTuple):
     law: FloatArray
     pose: FloatArray
     change: FloatArray
-    push: FloatArray
+    pose_a: FloatArray
     energy: FloatArray
     when: FloatArray
     level: FloatArray
     step: IndexArray
     step_time: FloatArray
     node_pose: FloatArray
-    node_push: FloatArray
+    node_a: FloatArray
     node_change: FloatArray
     node_level: FloatArray
     node_energy: FloatArray
@@ -279,7 +279,7 @@ def _run_of(scene: AskedOfScene, k: int, record: Law) -> _Run:
     parts = _no_steps(scene.pose.shape[2], change.shape[1]) if steps is None else _steps_of_law(steps, model, k, pair)
     return _Run(
         (code, before, int(model.active[0, k])), -1.0 if free is None else float(free), model.law[k],
-        scene.pose[states, pair][:, None], change[:, None], scene.push[states, pair], scene.energy[states],
+        scene.pose[states, pair][:, None], change[:, None], scene.pose_a[states, pair], scene.energy[states],
         scene.when[states], level, *parts,
     )  # fmt: skip
 
@@ -295,14 +295,14 @@ class Steps(NamedTuple):
     """The steps of a motion, in the order in which members that switch go through them, each with its nodes.
 
     step (K, 5), step_time (K, 2): as of `candidate_prices.Asked`. segment (K,): in which each is.
-    pose (nodes, G, POSE), push, change (nodes, G, D), energy (nodes,): at the nodes.
+    pose (nodes, G, POSE), pose_a, change (nodes, G, D), energy (nodes,): at the nodes.
     """
 
     step: IndexArray
     step_time: FloatArray
     segment: IndexArray
     pose: FloatArray
-    push: FloatArray
+    pose_a: FloatArray
     change: FloatArray
     energy: FloatArray
 
@@ -336,14 +336,15 @@ def steps_of(driver: "GeneralDriver", asked: AskedOfScene, index: IndexArray, ro
     times = np.array([each[2] for each in found])
     places = np.array([[k, min(c, 1.0) * node] for _, _, _, (k, c) in found for node in NODE])
     (q, out), _, _ = driver.sample_response(-1, places, False, count)
-    pose, push = np.zeros((len(places), *asked.pose.shape[1:])), np.zeros((len(places), *asked.push.shape[1:]))
-    keep_states(driver.ints, driver.floats, q, out[0], out[1], np.array(list(asked.pairs), dtype=np.int64), pose, push)
+    pose, pose_a = np.zeros((len(places), *asked.pose.shape[1:])), np.zeros((len(places), *asked.pose_a.shape[1:]))
+    pairs = np.array(list(asked.pairs), dtype=np.int64)
+    keep_states(driver.ints, driver.floats, q, out[0], out[1], pairs, pose, pose_a)
     change, energy = (
         [_between_stages(values, asked.when, slice(*where[:2]), *time) for (_, where, time, _) in found]
         for values in (asked.change, asked.energy)
     )
     return Steps(
-        np.array(step, dtype=np.int64).reshape(-1, 5), times, asked.segment[[each[0] for each in step]], pose, push,
+        np.array(step, dtype=np.int64).reshape(-1, 5), times, asked.segment[[each[0] for each in step]], pose, pose_a,
         np.concatenate(change), np.concatenate(energy),
     )  # fmt: skip
 
@@ -375,7 +376,7 @@ def _steps_of_law(steps: Steps, model: GeneralModel, k: int, pair: int) -> tuple
     time = steps.step_time[acts]
     when = (time[:, :1] + time[:, 1:] * NODE).ravel()
     level = _level(model, k, np.repeat(steps.segment[acts], NODES), when)
-    kept = steps.pose[nodes, pair], steps.push[nodes, pair], steps.change[nodes, pair]
+    kept = steps.pose[nodes, pair], steps.pose_a[nodes, pair], steps.change[nodes, pair]
     return step, time, *kept, level, steps.energy[nodes]
 
 

@@ -15,7 +15,7 @@ def test_calls_run_at_the_same_time_and_outcomes_keep_their_order():
         return value, current_thread()
 
     outcomes = side_by_side([lambda k=k: meet(k) for k in range(3)], 3)
-    values, threads = zip(*(outcome.taken() for outcome in outcomes), strict=True)
+    values, threads = zip(*(outcome.result() for outcome in outcomes), strict=True)
     assert values == (0, 1, 2)
     assert len(set(threads)) == 3
     assert current_thread() in threads
@@ -23,7 +23,7 @@ def test_calls_run_at_the_same_time_and_outcomes_keep_their_order():
 
 def test_one_thread_does_all_calls_in_turn():
     outcomes = side_by_side([current_thread] * 3, 1)
-    assert [outcome.taken() for outcome in outcomes] == [current_thread()] * 3
+    assert [outcome.result() for outcome in outcomes] == [current_thread()] * 3
 
 
 def test_an_error_is_that_of_its_call_alone():
@@ -31,9 +31,9 @@ def test_an_error_is_that_of_its_call_alone():
         raise ValueError("no such thing")
 
     first, second, third = side_by_side([lambda: 1, fail, lambda: 3], 2)
-    assert (first.taken(), third.taken()) == (1, 3)
+    assert (first.result(), third.result()) == (1, 3)
     with pytest.raises(ValueError, match="no such thing"):
-        second.taken()
+        second.result()
 
 
 def test_an_interrupt_goes_on_when_what_has_begun_is_over():
