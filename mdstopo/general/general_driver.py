@@ -2,14 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.memory import most_floats
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.case.responses import kind_of
@@ -60,6 +57,7 @@ from mdstopo.scene.modes import Modes
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
+    from mdstopo.general.entries import Entries
     from mdstopo.general.pricing import AskedOfMembers, GeneralCandidates
     from mdstopo.general.settle import Settled
 
@@ -73,11 +71,6 @@ SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
 WORTH = 1.05
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
-
-
-def load_method(kind: IntegratorKind) -> ModuleType:
-    """The compiled entries of a method for general scenes."""
-    return import_module(kind.general)
 
 
 class GeneralDriver:
@@ -125,7 +118,7 @@ class GeneralDriver:
         #: where the steps of the last evaluation had to end
         self.quadrature_breakpoints: list[float] = []
         self._inertial = bool(np.any(model.block[:, 3] == INERTER))
-        self._entry: Any = None
+        self._entry: Entries | None = None
         self._message = ""
         self._allowed = MAX_STEPS
         self._make_room(method.steps, method.stages, 64)
@@ -144,10 +137,12 @@ class GeneralDriver:
         return self._values
 
     @property
-    def entry(self) -> Any:
+    def entry(self) -> "Entries":
         """The method's compiled entries, imported when first used."""
         if self._entry is None:
-            self._entry = load_method(self.method.kind)
+            from mdstopo.general.entries import entries_of
+
+            self._entry = entries_of(self.method.kind)
         return self._entry
 
     def pack(self, model: GeneralModel) -> tuple[IndexArray, FloatArray]:

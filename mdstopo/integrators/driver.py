@@ -5,6 +5,7 @@ little, and gives the steps more room when the kernel asks for it.
 """
 
 from collections.abc import Callable
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -81,7 +82,7 @@ class Driver:
     def entry(self) -> Any:
         """The method's compiled entries, imported when first used."""
         if self._entry is None:
-            self._entry = self.method.load()
+            self._entry = import_module(self.method.kind.springs)
             if self._beside is not None and self._beside.due:
                 self._entry.simulate.compile(*self._simulate_arguments(False))
         return self._entry

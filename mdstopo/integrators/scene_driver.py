@@ -7,7 +7,6 @@ else (`general.general_driver`). `scene.family` tells which one a case needs; no
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from mdstopo.case.integrators import IntegratorKind
@@ -26,12 +25,11 @@ if TYPE_CHECKING:
 class Method:
     """An integrator as the engine sees it.
 
-    kind: its record. load: imports its compiled entries (simulate). tables: its constant arrays. steps, stages: room to
-    begin with. collocates: whether its stages are the nodes of Gauss's rules.
+    kind: its record. tables: its constant arrays. steps, stages: room to begin with. collocates: whether its stages are
+    the nodes of Gauss's rules.
     """
 
     kind: IntegratorKind
-    load: Callable[[], ModuleType]
     tables: FloatArray
     steps: int
     stages: int
