@@ -124,9 +124,11 @@ def _call(case: str, integrator: str, what: str) -> Callable[[], object]:
     return lambda: mdstopo.optimize(made, path=place, overwrite=True, workers=1)
 
 
-def _no_process(*_: object, **__: object) -> None:
+class _NoProcess(subprocess.Popen[bytes]):
     """In place of a process that would compile beside this one, where nothing is left out."""
-    raise OSError
+
+    def __init__(self, *_: object, **__: object) -> None:
+        raise OSError("no process beside this one")
 
 
 def _serve(part: str, kept: bool) -> None:
@@ -134,7 +136,7 @@ def _serve(part: str, kept: bool) -> None:
     case, integrator, what, leave_out = PARTS[part]
     if not kept:
         leave_out()
-    subprocess.Popen = _no_process  # type: ignore[assignment,misc]
+    subprocess.Popen = _NoProcess  # type: ignore[assignment,misc]
     call = _call(case, integrator, what)
     began = time.process_time()
     call()
