@@ -38,7 +38,7 @@ from mdstopo.general.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.turning_drives import global_moments
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
-from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
+from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult
 from mdstopo.integrators.steps import (
     CHATTERING,
     HALF_TURN,
@@ -54,12 +54,13 @@ from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.diagnosis import fastest_body, member_in_words
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.modes import Modes
+from mdstopo.scene.settled import Settled
+from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.general.entries import Entries
     from mdstopo.general.pricing import AskedOfMembers, GeneralCandidates
-    from mdstopo.general.settle import Settled
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
@@ -558,7 +559,7 @@ class GeneralDriver:
 
         return start_modes(self, alpha)
 
-    def settled(self, alpha: FloatArray) -> "Settled | None":
+    def settled(self, alpha: FloatArray) -> Settled | None:
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
         return self.start.settled if self.start is not None and self.settle(alpha) else None
 

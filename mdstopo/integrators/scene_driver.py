@@ -1,24 +1,19 @@
 """What the engine knows of whatever computes a scene: one interface, whichever kernels the scene needs.
 
-A `SceneFamily` compiles the load cases of a case into scenes, and makes of each a `SceneDriver`, which simulates and
-differentiates it. There are two families: springs between free bodies (`sensitivity.springs_driver`), and everything
-else (`general.general_driver`). `scene.family` tells which one a case needs; nothing else asks for it.
+A `SceneDriver` simulates and differentiates one load case. `SceneFamily` (`sensitivity.scene_family`) makes it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from mdstopo.case.integrators import IntegratorKind
-from mdstopo.case.model import Case, LoadCase, MemberGroup, Objective, ResponseRow
+from mdstopo.case.model import LoadCase, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.modes import Modes
+from mdstopo.scene.settled import Settled
 from mdstopo.status import Status
-
-if TYPE_CHECKING:
-    from mdstopo.general.settle import Settled
-    from mdstopo.sensitivity.candidate_pass import CandidatePass
 
 
 @dataclass(frozen=True)
@@ -195,7 +190,7 @@ class SceneDriver(Protocol):
         """What rows of the last evaluation, each times its factor (n_obj, R), ask of any member, built or not; with
         gradients. Its `of_all` puts those of several scenes together; `SceneFamily.candidates` takes it."""
 
-    def settled(self, alpha: FloatArray) -> "Settled | None":
+    def settled(self, alpha: FloatArray) -> Settled | None:
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
 
 
@@ -215,18 +210,3 @@ class DriverOptions:
     looked: Sequence[Objective | ResponseRow]
     design: FloatArray
     beside: Compiling | None = None
-
-
-class SceneFamily(NamedTuple):
-    """What one family of kernels computes.
-
-    scenes: the load cases of a case as scenes, by name. driver: the driver of one of them. candidates: those of a
-    priced group, from the scenes, the group's number and the group as the scenes have it, where its points P and Q are
-    at the start, (n, d) each, and about how many are meant (None: all).
-    """
-
-    scenes: Callable[[Case], Mapping[str, Scene]]
-    driver: Callable[[Case, Any, DriverOptions], SceneDriver]
-    candidates: Callable[
-        [Mapping[str, Any], int, MemberGroup, tuple[FloatArray, FloatArray], int | None], "CandidatePass[Any]"
-    ]

@@ -13,8 +13,7 @@ from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.case.uncertain import Measure
 from mdstopo.design_problem import competes, sign_of
 from mdstopo.engine import Evaluator
-from mdstopo.error_estimate import ErrorEstimate
-from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows
+from mdstopo.evaluation import USUAL, ErrorEstimate, Evaluation, FloatArray, Peak, Rows
 from mdstopo.integrators.steps import WORK_NAMES
 from mdstopo.robust.points import evaluator_at, name_of, nominal_evaluator
 from mdstopo.robust.robust_measures import rows, slopes

@@ -8,16 +8,17 @@ import numpy as np
 
 from mdstopo.case.model import Case, MemberGroup
 from mdstopo.integrators.driver import Driver
-from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
+from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.diagnosis import Diagnosis
 from mdstopo.scene.model import FloatArray
 from mdstopo.scene.modes import Modes
+from mdstopo.scene.settled import Settled
 from mdstopo.sensitivity.reductions import INTEGRALS, REDUCTIONS
+from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
-    from mdstopo.general.settle import Settled
     from mdstopo.sensitivity.pricing import Asked, SpringCandidates
 
 
@@ -82,7 +83,7 @@ class SpringsDriver(Driver):
 
         return start_modes(self.case, self.scene, alpha)
 
-    def settled(self, alpha: FloatArray) -> "Settled | None":
+    def settled(self, alpha: FloatArray) -> Settled | None:
         """None: a case that settles is none of springs between free bodies."""
         return None
 
