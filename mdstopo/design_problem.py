@@ -44,7 +44,7 @@ class DesignEvaluator(Protocol):
         self, alpha: Floats, gradient: bool = True, sensitivity: str | None = None, rows: Rows = USUAL
     ) -> Evaluation: ...
     def looking_at(self, objectives: Sequence[str]) -> "DesignEvaluator": ...
-    def asked_of_members(self, weights: Mapping[str, Sequence[float]]) -> Any: ...
+    def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any: ...
 
 
 class DesignProblem:
@@ -109,7 +109,7 @@ class DesignProblem:
         """What the engine finds at x, with as many rows as compete."""
         return self._with_all_that_compete(self._design(x), gradient)
 
-    def asked_of_members(self, evaluation: Evaluation, rows: Floats) -> Any:
+    def pricing_states(self, evaluation: Evaluation, rows: Floats) -> Any:
         """What the rows of U and those of constraints on responses, each times its factor (R + C,), ask of members,
         built or not, at the last evaluation.
 
@@ -135,7 +135,7 @@ class DesignProblem:
             weights = weights + rows[len(sample.rows) :] @ sample.constraint_gradients
         ends = np.cumsum(list(places.values()))
         parts = zip(places, np.split(weights, ends[:-1]), strict=True)
-        return self._evaluator.asked_of_members({name: part.tolist() for name, part in parts})
+        return self._evaluator.pricing_states({name: part.tolist() for name, part in parts})
 
     def sample_of(self, evaluation: Evaluation, gradient: bool = True, x: Floats | None = None) -> Sample:
         """The rows of U of an evaluation; x: of the design, where sums of lengths vary with it."""
@@ -187,7 +187,7 @@ class DesignProblem:
             rows = rows._replace(most=GROWTH * most)
 
     def _cones(self, objective: Objective, sign: float, evaluation: Evaluation) -> "Cones":
-        """What the rows of the only objective are norms of."""
+        """The vectors whose norms are the rows of the only objective, as cones."""
         if not (sign > 0.0 and competes(objective, sign)) or evaluation.all_compete:
             return Cones.none()
         return Cones.of([(peak, 1.0, 0.0) for peak in evaluation.peaks[objective.name]], self._pull)

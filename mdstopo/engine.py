@@ -236,7 +236,7 @@ class Evaluator:
 
         return Estimator(self)
 
-    def asked_of_members(self, weights: Mapping[str, Sequence[float]]) -> Any:
+    def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any:
         """What a weighted sum of peaks of the last evaluation asks of members, whether they are built or not.
 
         weights: of the peaks of each objective, and of each constraint on a response by its key path, in their order.
@@ -247,7 +247,7 @@ class Evaluator:
             factor = np.zeros(driver.rows.shape[:2])
             for j, key in enumerate(keys):
                 factor[j, : len(weights[key])] = weights[key]
-            parts.append(driver.asked_of_members(factor))
+            parts.append(driver.pricing_states(factor))
         return type(parts[0]).of_all(parts)
 
     def candidates_of(self, group: MemberGroup, count: int | None = None) -> "CandidatePass[Any]":

@@ -145,11 +145,10 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         **members, times=times, **loads._asdict(), **timed._asdict(),
         driven_par=made.formulas, driven_mode=made.modes, bushing_pair=bushing_pair, bushing=bushing,
         driven=made.driven, drive=made.cubics, drive_frame=made.frames, drive_turn=made.turns,
-        joint=joint, joint_par=joint_par, row=layout.row, place=layout.place,
+        joint=joint, joint_par=joint_par, **layout.fields(),
         size=np.array(
-            [*layout.size, int(by_order_8), len(layout.steady), bodies.load_slopes, bodies.attitude], dtype=np.int64
-        ), line=layout.line,
-        envelope=layout.envelope, product=layout.product, steady=layout.steady,
+            [*layout.size, int(by_order_8), len(layout.schur_constant), bodies.load_slopes, bodies.attitude], np.int64
+        ),
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
         varied=entries, along=along(entries),
     )  # fmt: skip

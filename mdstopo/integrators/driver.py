@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.memory import holds_steps
+from mdstopo.case.memory import room_factor
 from mdstopo.compiler.fields import aligned
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, quadrature_breakpoints
@@ -197,9 +197,10 @@ class Driver:
             code, count, time = self._simulate[tangent]()
             if code != NEEDS_ROOM:
                 return code, count, time
-            if not holds_steps(2 * len(self.room)):
+            factor = room_factor(len(self.room))
+            if factor == 1.0:
                 return STEP_LIMIT, count if time > self.scene.model.times[0] else 0, time
-            self._make_room(2 * int(self.limits[1]), 2 * int(self.limits[2]))
+            self._make_room(*(int(factor * int(size)) for size in self.limits[1:3]))
 
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the strengths of the last run."""

@@ -186,9 +186,10 @@ class SceneDriver(Protocol):
     def start_modes(self, alpha: FloatArray) -> Modes:
         """Small motion about the start."""
 
-    def asked_of_members(self, factor: FloatArray) -> Any:
-        """What rows of the last evaluation, each times its factor (n_obj, R), ask of any member, built or not; with
-        gradients. Its `of_all` puts those of several scenes together; `SceneFamily.candidates` takes it."""
+    def pricing_states(self, factor: FloatArray) -> Any:
+        """The states from which prices of members follow, built or not, of the rows of the last evaluation, each times
+        its factor (n_obj, R); with gradients. Their `of_all` puts those of several scenes together;
+        `CandidatePass` takes them."""
 
     def settled(self, alpha: FloatArray) -> Settled | None:
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
