@@ -22,12 +22,19 @@ ROUNDS, SECONDS = 31, 0.15
 BAR = 1.05
 
 
+def _changed(module: str, name: str, value: float) -> None:
+    """Give a number of a module another value, before kernels are compiled with it."""
+    found = importlib.import_module(module)
+    getattr(found, name)  # AttributeError, not a measurement of nothing, where it has another name
+    setattr(found, name, value)
+
+
 def _without_single_precision() -> None:
-    importlib.import_module("mdstopo.integrators.gauss").ROUGH_TOLERANCE = float("inf")  # type: ignore[attr-defined]
+    _changed("mdstopo.integrators.gauss", "SINGLE_TOLERANCE", float("inf"))
 
 
 def _with_libm_sines() -> None:
-    importlib.import_module("mdstopo.mechanics.angles").FAR = -1.0  # type: ignore[attr-defined]
+    _changed("mdstopo.mechanics.angles", "FAR", -1.0)
 
 
 def _with_libm_powers() -> None:
@@ -124,9 +131,11 @@ def _call(case: str, integrator: str, what: str) -> Callable[[], object]:
     return lambda: mdstopo.optimize(made, path=place, overwrite=True, workers=1)
 
 
-def _no_process(*_: object, **__: object) -> None:
+class _NoProcess(subprocess.Popen[bytes]):
     """In place of a process that would compile beside this one, where nothing is left out."""
-    raise OSError
+
+    def __init__(self, *_: object, **__: object) -> None:
+        raise OSError("no process beside this one")
 
 
 def _serve(part: str, kept: bool) -> None:
@@ -134,7 +143,7 @@ def _serve(part: str, kept: bool) -> None:
     case, integrator, what, leave_out = PARTS[part]
     if not kept:
         leave_out()
-    subprocess.Popen = _no_process  # type: ignore[assignment,misc]
+    subprocess.Popen = _NoProcess  # type: ignore[assignment,misc]
     call = _call(case, integrator, what)
     began = time.process_time()
     call()

@@ -180,12 +180,12 @@ def compared(name: str, case: Case) -> list[str]:
     problem = evaluator.problem()
     evaluation = problem.evaluation(case.initial)  # type: ignore[attr-defined]
     first = np.eye(len(problem.sample_of(evaluation).rows))[0]  # type: ignore[attr-defined]
-    asked = problem.asked_of_members(evaluation, first)  # type: ignore[attr-defined]
+    states = problem.pricing_states(evaluation, first)  # type: ignore[attr-defined]
     candidates = evaluator.candidates_of(group)
-    found = candidates.prices(asked, every // width, every % width)
+    found = candidates.prices(states, every // width, every % width)
     many = rng.integers(0, candidates.candidates.count, TIMED)
     began = time.process_time()
-    candidates.prices(asked, many // width, many % width)
+    candidates.prices(states, many // width, many % width)
     seconds = time.process_time() - began
     built = with_members(case, {group.name: np.divmod(every, width)})
     alpha = np.where(np.isin(every, own), case.initial[0], 0.0)

@@ -19,8 +19,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case
 from mdstopo.engine import Evaluator
-from mdstopo.error_estimate import ErrorEstimate
-from mdstopo.evaluation import Evaluation, FloatArray, Peak
+from mdstopo.evaluation import ErrorEstimate, Evaluation, FloatArray, Peak
 from mdstopo.evaluators import evaluator_of
 from mdstopo.integrators.trajectory import States, Trajectory
 from mdstopo.session.outcome import Outcome as Result

@@ -5,16 +5,16 @@ of several peaks (a maximum that is minimised, a minimum that is maximised) ever
 (bound formulation); elsewhere the one value is.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from mdstopo.case.design_space import DesignSpace
 from mdstopo.case.errors import CaseError
 from mdstopo.case.exchange import Side, exchange_ends
-from mdstopo.case.model import Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import Case, Objective, ResponseRow, VolumeRow
 from mdstopo.case.responses import kind_of
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
@@ -23,9 +23,6 @@ from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.scene.moving_volumes import moving_volumes
 from mdstopo.scene.refusals import refusals
 from mdstopo.status import Status
-
-if TYPE_CHECKING:
-    from mdstopo.engine import Evaluator
 
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
@@ -38,6 +35,18 @@ NEAR, ALL = (0.3, 12), (0.6, 60)
 TIED, GROWTH, MOST_ROWS, ROOM = 0.1, 4, 960, 2e7
 
 
+class DesignEvaluator(Protocol):
+    """What the problem asks of `engine.Evaluator`, where each function is described."""
+
+    case: Case
+
+    def evaluate(
+        self, alpha: Floats, gradient: bool = True, sensitivity: str | None = None, rows: Rows = USUAL
+    ) -> Evaluation: ...
+    def looking_at(self, objectives: Sequence[str]) -> "DesignEvaluator": ...
+    def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any: ...
+
+
 class DesignProblem:
     """The `Problem` of a case: volume rows, constraints on responses, and one objective or a scalarisation of several.
 
@@ -45,7 +54,7 @@ class DesignProblem:
     the case's only objective. Raises CaseError where the case asks for what is not computed.
     """
 
-    def __init__(self, evaluator: "Evaluator", scalarisation: Scalarisation | None = None) -> None:
+    def __init__(self, evaluator: DesignEvaluator, scalarisation: Scalarisation | None = None) -> None:
         case = evaluator.case
         refused = refusals(case)
         if refused:
@@ -100,7 +109,7 @@ class DesignProblem:
         """What the engine finds at x, with as many rows as compete."""
         return self._with_all_that_compete(self._design(x), gradient)
 
-    def asked_of_members(self, evaluation: Evaluation, rows: Floats) -> Any:
+    def pricing_states(self, evaluation: Evaluation, rows: Floats) -> Any:
         """What the rows of U and those of constraints on responses, each times its factor (R + C,), ask of members,
         built or not, at the last evaluation.
 
@@ -126,7 +135,7 @@ class DesignProblem:
             weights = weights + rows[len(sample.rows) :] @ sample.constraint_gradients
         ends = np.cumsum(list(places.values()))
         parts = zip(places, np.split(weights, ends[:-1]), strict=True)
-        return self._evaluator.asked_of_members({name: part.tolist() for name, part in parts})
+        return self._evaluator.pricing_states({name: part.tolist() for name, part in parts})
 
     def sample_of(self, evaluation: Evaluation, gradient: bool = True, x: Floats | None = None) -> Sample:
         """The rows of U of an evaluation; x: of the design, where sums of lengths vary with it."""
@@ -178,7 +187,7 @@ class DesignProblem:
             rows = rows._replace(most=GROWTH * most)
 
     def _cones(self, objective: Objective, sign: float, evaluation: Evaluation) -> "Cones":
-        """What the rows of the only objective are norms of."""
+        """The vectors whose norms are the rows of the only objective, as cones."""
         if not (sign > 0.0 and competes(objective, sign)) or evaluation.all_compete:
             return Cones.none()
         return Cones.of([(peak, 1.0, 0.0) for peak in evaluation.peaks[objective.name]], self._pull)

@@ -19,7 +19,7 @@ from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
 from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
-from mdstopo.integrators.scene_driver import DriverOptions, Method, ResponseResult, Scene, SceneDriver, SceneFamily
+from mdstopo.integrators.scene_driver import DriverOptions, Method, ResponseResult, Scene, SceneDriver
 from mdstopo.integrators.steps import WORK, work_named
 from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.border import border_of
@@ -28,6 +28,8 @@ from mdstopo.scene.family import beyond_springs, collocates
 from mdstopo.scene.modes import Modes
 from mdstopo.scene.origin import extent_of, origin_of, seen_from, starting_places
 from mdstopo.scene.refusals import BY_PARAMETERS, no_derivatives, refusals
+from mdstopo.scene.settled import Settled
+from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.sensitivity.springs_driver import SPRINGS
 from mdstopo.status import Status
 from mdstopo.warm import Beside
@@ -35,7 +37,6 @@ from mdstopo.warm import Beside
 if TYPE_CHECKING:
     from mdstopo.error_estimate import Estimator
     from mdstopo.general.general_driver import GeneralDriver
-    from mdstopo.general.settle import Settled
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
     from mdstopo.sensitivity.candidate_pass import CandidatePass
@@ -235,7 +236,7 @@ class Evaluator:
 
         return Estimator(self)
 
-    def asked_of_members(self, weights: Mapping[str, Sequence[float]]) -> Any:
+    def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any:
         """What a weighted sum of peaks of the last evaluation asks of members, whether they are built or not.
 
         weights: of the peaks of each objective, and of each constraint on a response by its key path, in their order.
@@ -246,7 +247,7 @@ class Evaluator:
             factor = np.zeros(driver.rows.shape[:2])
             for j, key in enumerate(keys):
                 factor[j, : len(weights[key])] = weights[key]
-            parts.append(driver.asked_of_members(factor))
+            parts.append(driver.pricing_states(factor))
         return type(parts[0]).of_all(parts)
 
     def candidates_of(self, group: MemberGroup, count: int | None = None) -> "CandidatePass[Any]":
@@ -322,7 +323,7 @@ class Evaluator:
             self._narrower[names] = Evaluator(narrower, beside=False, beyond=self._asked_beyond)
         return self._narrower[names]
 
-    def settled(self, alpha: FloatArray, load_case: str) -> "Settled | None":
+    def settled(self, alpha: FloatArray, load_case: str) -> Settled | None:
         """How far the start moves to be at rest with alpha (N,); None where the case does not settle, or cannot."""
         return self.driver(load_case).settled(self.design(alpha)) if self.case.solver.settle else None
 

@@ -10,17 +10,16 @@ rounded otherwise (`scene.rounding`), and the larger difference is added. How fa
 chance: both differences are less than a tenth of the error in fewer than one of a hundred.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 
 from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.evaluation import Evaluation, FloatArray
-
-if TYPE_CHECKING:
-    from mdstopo.engine import Evaluator
+from mdstopo.case.model import Case
+from mdstopo.evaluation import ErrorEstimate, Evaluation, FloatArray
+from mdstopo.integrators.scene_driver import Scene, SceneDriver
 
 FINER = 1e-3
 #: the tightest tolerance that double precision lets be kept, and where one that does no more for a result is given up
@@ -31,18 +30,24 @@ ROUNDING = 1e-15
 SAMPLES = 1, 2
 
 
-@dataclass(frozen=True)
-class ErrorEstimate:
-    """Of one objective, absolute. value: of G; gradient: of the worst entry of dG/dalpha, NaN where there is none."""
+class AnyEvaluator(Protocol):
+    """What an estimate asks of `engine.Evaluator`, where each function is described."""
 
-    value: float
-    gradient: float
+    case: Case
+
+    @property
+    def integrator(self) -> str: ...
+    @property
+    def scenes(self) -> Mapping[str, Scene]: ...
+    def driver(self, name: str) -> SceneDriver: ...
+    def otherwise(self, sample: int = 0, **solver: Any) -> "AnyEvaluator": ...
+    def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation: ...
 
 
 class Estimator:
     """Error estimates for the evaluations of one evaluator."""
 
-    def __init__(self, evaluator: "Evaluator") -> None:
+    def __init__(self, evaluator: AnyEvaluator) -> None:
         self._evaluator = evaluator
         #: why there was no estimate the last time
         self.why = ""
@@ -91,11 +96,11 @@ class Estimator:
             if not _same_steps(coarser, found) or tolerance >= COARSEST:
                 return coarser
 
-    def _at(self, tolerance: float) -> "Evaluator":
+    def _at(self, tolerance: float) -> AnyEvaluator:
         return self._evaluator.otherwise(integrator=self._evaluator.integrator, tolerance=tolerance)
 
     @cached_property
-    def _halved(self) -> "Evaluator":
+    def _halved(self) -> AnyEvaluator:
         """The same evaluator with half its fixed steps."""
         coarse, solver = self._evaluator, self._evaluator.case.solver
         if solver.step is not None:

@@ -1,16 +1,14 @@
 """What an evaluation gives back."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.shown import html_of
 from mdstopo.status import Status
-
-if TYPE_CHECKING:
-    from mdstopo.error_estimate import ErrorEstimate
 
 FloatArray = NDArray[np.float64]
 
@@ -61,6 +59,14 @@ class Peak(NamedTuple):
     shape: Shape = "plain"
 
 
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Of one objective, absolute. value: of G; gradient: of the worst entry of dG/dalpha, NaN where there is none."""
+
+    value: float
+    gradient: float
+
+
 class Evaluation(NamedTuple):
     """One design, evaluated; mappings by objective name.
 
@@ -87,7 +93,7 @@ class Evaluation(NamedTuple):
     message: str = ""
     constraint_peaks: Mapping[int, tuple[Peak, ...]] = _NONE
     all_compete: bool = False
-    errors: "Mapping[str, ErrorEstimate]" = _NONE
+    errors: Mapping[str, ErrorEstimate] = _NONE
     variables: Mapping[str, FloatArray] = _NONE
     variable_gradients: Mapping[str, Mapping[str, FloatArray]] = _NONE
     constraint_variable_gradients: Mapping[str, FloatArray] = _NONE

@@ -36,7 +36,7 @@ from mdstopo.case.model import SolverSettings
 from mdstopo.compiler import store
 from mdstopo.compiler.entry import DTYPES, Entry, types_of
 from mdstopo.compiler.threads import cores
-from mdstopo.general.general_driver import load_method
+from mdstopo.general.entries import entries_of
 from mdstopo.integrators.choice import method_of
 
 HERE = Path(__file__).resolve().parent
@@ -77,10 +77,10 @@ def variants(general: bool) -> list[Variant]:
     for name, kind in INTEGRATORS.items():
         made = method_of(name, SolverSettings())
         if general:
-            loaded = load_method(kind)
+            loaded: Any = entries_of(kind)
             scenes = [PLANAR_SCENE] * (not kind.free_only) + [SPATIAL_SCENE] * (not kind.planar)
         elif kind.springs:
-            loaded, scenes = made.load(), [PLANAR_SCENE]
+            loaded, scenes = importlib.import_module(kind.springs), [PLANAR_SCENE]
         else:
             continue
         types = types_of((loaded.TAG, made.tables))

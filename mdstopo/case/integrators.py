@@ -13,8 +13,8 @@ class IntegratorKind(NamedTuple):
 
     name: as case files have it; doc: a sentence for the case reference. made_by: module:function, called with the
     solver's settings, which returns the `integrators.scene_driver.Method`.
-    springs: whether it computes springs between free bodies by their own kernels. general: the module with its entries
-    for all other scenes (`general.method_interface`); empty where there are none.
+    springs: the module with its entries for springs between free bodies (`integrators.steps_interface`); general: that
+    for all other scenes (`general.method_interface`). Empty where there are none.
     adaptive: whether it chooses steps by the tolerance where none is given. finds_step: whether it finds a fixed step
     by itself. order: of the error of fixed steps in their length.
     explicit: whether stages follow from those before them. has_radius: whether it takes a spectral radius; iterative:
@@ -26,7 +26,7 @@ class IntegratorKind(NamedTuple):
     name: str
     doc: str
     made_by: str
-    springs: bool = False
+    springs: str = ""
     general: str = ""
     adaptive: bool = False
     finds_step: bool = False
@@ -47,7 +47,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             "adaptive collocation at Gauss nodes; for springs between free bodies and their energy, and in space for "
             "free bodies between which forces are smooth",
             "mdstopo.integrators.choice:gauss",
-            springs=True,
+            springs="mdstopo.integrators.gauss_entry",
             general="mdstopo.general.gauss_entry",
             adaptive=True,
             free_only=True,
@@ -56,7 +56,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             "runge_kutta",
             "explicit and adaptive; for everything",
             "mdstopo.integrators.choice:runge_kutta",
-            springs=True,
+            springs="mdstopo.integrators.runge_kutta_entry",
             general="mdstopo.general.runge_kutta_entry",
             adaptive=True,
             explicit=True,
@@ -65,7 +65,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             "generalized_alpha",
             "implicit, fixed steps; for stiff scenes and the paper's figures",
             "mdstopo.integrators.choice:generalized_alpha",
-            springs=True,
+            springs="mdstopo.integrators.generalized_alpha_entry",
             general="mdstopo.general.generalized_alpha_entry",
             finds_step=True,
             has_radius=True,
@@ -75,7 +75,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             "esdirk",
             "implicit, adaptive and L-stable, of order 4; for stiff contacts and dampers in a plane",
             "mdstopo.integrators.choice:esdirk",
-            general="mdstopo.general.esdirk_entry",
+            general="mdstopo.general.esdirk",
             adaptive=True,
             order=4,
             planar=True,

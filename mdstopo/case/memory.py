@@ -10,6 +10,8 @@ BYTES_PER_MEMBER = 200
 BYTES_PER_POINT = 100
 SHARE_OF_STEPS = 8
 """The steps of one simulation, all of which are kept, may take one part in this many of the memory."""
+WORTH = 1.05
+"""Room for steps that would grow by less than this stays as it is."""
 _UNKNOWN = 8 * 2**30
 _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
@@ -33,6 +35,7 @@ def most_floats() -> int:
     return total_memory() // (8 * SHARE_OF_STEPS)
 
 
-def holds_steps(floats: int) -> bool:
-    """Whether there is room for the steps of a simulation that are so many numbers."""
-    return floats <= most_floats()
+def room_factor(floats: int) -> float:
+    """By how much the room for steps, so many numbers, grows when it is full: at most 2; 1 where memory ends."""
+    factor = min(2.0, most_floats() / floats)
+    return factor if factor >= WORTH else 1.0

@@ -264,7 +264,7 @@ class Case(Value):
         return read_only(np.concatenate([g.cost for g in groups]) if groups else np.zeros(0))
 
     def whole(self, design: FloatArray) -> FloatArray:
-        """A design (N + P,) from alpha (N,), to which the initial values of variables are added, or from a whole."""
+        """A design (N + P,): from alpha (N,), with the initial values of variables behind it; a whole one as it is."""
         if self.variables and design.shape == (self.n_design,):
             return np.concatenate([design, self.start[self.n_design :]])
         return design

@@ -32,18 +32,39 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     (exit status 2).
     """
     from mdstopo.case.errors import CaseError
-    from mdstopo.case.reader import load_case
-    from mdstopo.cli.check_numbers import frequencies, material, totals
-    from mdstopo.cli.check_scene import odd_scales
     from mdstopo.scene.refusals import refusals
 
     output = Output(json=as_json, quiet=quiet)
+    case = _read(output, case_path, overrides)
+    refused = refusals(case)
+    document = _say_stated(output, case, case_path)
+    document["optimizable"] = case.is_optimizable and not refused
+    document["refused"] = [mistake.located(str(case_path)) for mistake in refused]
+    if not refused:
+        document |= _say_computed(output, case)
+    output.document(document)
+    if refused:
+        raise CaseError(refused, str(case_path))
+    return 0
+
+
+def _read(output: Output, case_path: Path, overrides: dict[str, str]) -> "Case":
+    """The case; its mistakes are printed where it has some (CaseError)."""
+    from mdstopo.case.errors import CaseError
+    from mdstopo.case.reader import load_case
+
     try:
-        case = load_case(case_path, overrides)
+        return load_case(case_path, overrides)
     except CaseError as error:
         output.document(_mistaken(case_path, error))
         raise
-    refused = refusals(case)
+
+
+def _say_stated(output: Output, case: "Case", case_path: Path) -> dict[str, Any]:
+    """What the file states, without computing any motion: warnings, parts, totals, material."""
+    from mdstopo.cli.check_numbers import material, totals
+    from mdstopo.cli.check_scene import odd_scales
+
     for remark in case.warnings:
         output.notice(f"warning: {remark.located(str(case_path))}")
     for question in odd_scales(case):
@@ -63,18 +84,15 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     if rows:
         output.say("material (Eq. 14)")
         output.table([["groups", "sense", "bound", "at start", "all at lower", "all at upper"], *rows])
-    document: dict[str, Any] = {
+    candidates = {each.name: each.candidates.count for each in case.priced_groups if each.candidates}
+    return {
         "command": "check",
         "case": case.name,
         "title": case.title,
         "joints": [joint.name for joint in case.joints],
         "members": case.n_members,
         "design_variables": case.n_design,
-        **(
-            {"candidates": {each.name: each.candidates.count for each in case.priced_groups if each.candidates}}
-            if case.priced_groups
-            else {}
-        ),
+        **({"candidates": candidates} if candidates else {}),
         "variables": {
             each.name: {"values": each.count, "initial": each.initials.tolist() if each.points else each.initial}
             for each in case.variables
@@ -83,39 +101,39 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         **({"fit": [each.key for each in case.fit.numbers]} if case.fit is not None else {}),
         "totals": {name: {"value": value, "unit": unit} for name, value, unit in sums},
         "objectives": [objective.name for objective in case.objectives],
-        "optimizable": case.is_optimizable and not refused,
-        "refused": [mistake.located(str(case_path)) for mistake in refused],
     }
-    if not refused:
-        document["uncertainty"] = say_sample(output, case)
-        announce_compilation(output, case)
-        from mdstopo.evaluators import evaluator_of
 
-        engine = evaluator_of(case, beside=False)
-        freedoms = {name: engine.degrees_of_freedom(name) for name in engine.scenes}
-        for name, freedom in freedoms.items():
-            output.say(f"load case {name}: {freedom} degrees of freedom")
-            redundant = engine.scenes[name].redundant
-            if redundant:
-                output.say(f"load case {name}: joints with rows that others imply: {', '.join(redundant)}")
-        document["degrees_of_freedom"] = max(freedoms.values())
-        found = frequencies(case, engine)
-        for name in freedoms:
-            rest = engine.settled(case.initial, name)
-            if rest is not None:
-                output.say(f"load case {name}: {rest}")
-        _say_frequencies(output, case, found)
-        document |= _say_doubts(output, case, engine)
-        output.say("left out, because nothing asks for it")
-        for sentence in engine.skipped or ("nothing",):
-            output.say(f"  {sentence}")
-        output.table([["integrator", f"{engine.integrator}: {engine.integrator_reason}"]], indent="")
-        document |= {"frequencies": found, "skipped": engine.skipped, "integrator": engine.integrator}
-        document["evaluation"] = _say_cost(output, case, engine)
-    output.document(document)
-    if refused:
-        raise CaseError(refused, str(case_path))
-    return 0
+
+def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
+    """What the engine tells: freedoms, frequencies, doubts, what is left out, and what an evaluation costs."""
+    from mdstopo.cli.check_numbers import frequencies
+
+    document: dict[str, Any] = {"uncertainty": say_sample(output, case)}
+    announce_compilation(output, case)
+    from mdstopo.evaluators import evaluator_of
+
+    engine = evaluator_of(case, beside=False)
+    freedoms = {name: engine.degrees_of_freedom(name) for name in engine.scenes}
+    for name, freedom in freedoms.items():
+        output.say(f"load case {name}: {freedom} degrees of freedom")
+        redundant = engine.scenes[name].redundant
+        if redundant:
+            output.say(f"load case {name}: joints with rows that others imply: {', '.join(redundant)}")
+    document["degrees_of_freedom"] = max(freedoms.values())
+    found = frequencies(case, engine)
+    for name in freedoms:
+        rest = engine.settled(case.initial, name)
+        if rest is not None:
+            output.say(f"load case {name}: {rest}")
+    _say_frequencies(output, case, found)
+    document |= _say_doubts(output, case, engine)
+    output.say("left out, because nothing asks for it")
+    for sentence in engine.skipped or ("nothing",):
+        output.say(f"  {sentence}")
+    output.table([["integrator", f"{engine.integrator}: {engine.integrator_reason}"]], indent="")
+    document |= {"frequencies": found, "skipped": engine.skipped, "integrator": engine.integrator}
+    document["evaluation"] = _say_cost(output, case, engine)
+    return document
 
 
 def _say_cost(output: Output, case: "Case", engine: "Evaluator") -> dict[str, Any] | None:

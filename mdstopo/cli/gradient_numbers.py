@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
-    from mdstopo.error_estimate import ErrorEstimate
-    from mdstopo.evaluation import Evaluation
+    from mdstopo.evaluation import ErrorEstimate, Evaluation
 
 Floats = NDArray[np.float64]
 Objectives = Callable[[Floats], Mapping[str, float]]

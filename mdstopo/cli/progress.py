@@ -85,7 +85,7 @@ class Live(displays.Live["Progress"]):
         self._rate = Rate()
 
     def __call__(self, progress: "Progress") -> None:
-        """Count it, and draw it if it is time."""
+        """Count an iteration, and draw how far the run is if enough time has passed."""
         self._rate.add()
         super().__call__(progress)
 

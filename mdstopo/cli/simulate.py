@@ -25,7 +25,7 @@ from mdstopo.cli.output import Output, duration, number
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, FloatArray
-    from mdstopo.general.settle import Settled
+    from mdstopo.scene.settled import Settled
     from mdstopo.store.contents import Motion
 
 

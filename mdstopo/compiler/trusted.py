@@ -9,8 +9,6 @@ import os
 import stat
 from pathlib import Path
 
-_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-
 
 class NotOursError(OSError):
     """A file that is not to be written to; a clause that says why."""

@@ -15,7 +15,7 @@ from mdstopo.formula.modes import bit
 from mdstopo.formula.tree import NAME, NUMBER, Expression, names_in, operation, parts
 from mdstopo.formula.values import value_of
 
-#: sides that are kept at most, and sides that are looked at
+#: sides that are kept at most, and sides that are evaluated
 MOST, LOOKS = 8, 100
 
 
@@ -43,7 +43,7 @@ class _NotKnownError(Exception):
 def idle_sides(formulas: tuple[Expression, ...], guards: Sequence[tuple[Expression, Expression]]) -> tuple[Idle, ...]:
     """The sides of switches ("bit 0" and so on) on which formulas are 0, as far as they are found with little work.
 
-    guards: operations that may have no value, and of each what is not 0 where it is looked at. Where one may have none,
+    guards: operations that may have no value, and of each what is not 0 where it is evaluated. Where one may have none,
     formulas are not taken to be 0.
     """
     found: list[Idle] = []

@@ -39,7 +39,7 @@ from mdstopo.formula.tree import NUMBER, Expression, name, names_in, number, ope
 FORCE, LOWEST, FIRST = 0, 1, 2
 #: operations of all groups at most
 MOST_OPERATIONS = 20_000
-#: a margin where no switch is looked at
+#: a margin where no switch is evaluated
 NONE = number(1e300)
 #: slopes that are smaller than the one are none, and those that are larger than the other infinite
 NOUGHT, LARGE = number(1e-300), number(1e100)
@@ -48,7 +48,7 @@ LIMITED = ("sqrt", "^", "powlog", "log", "asin", "acos", "/")
 
 
 class Guard(NamedTuple):
-    """An operation that may have no value, and 1 where it is looked at, else 0."""
+    """An operation that may have no value, and an expression that is 1 where it is evaluated, else 0."""
 
     part: Expression
     reached: Expression
@@ -140,7 +140,7 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
 
     Names in them are x, xd, t, l0, "p 0" and so on for parameters, "bit 0" and so on for switches. Groups are: f, f_x,
     f_xd, V, V_x; the smallest margin; then for each parameter, and for the free length, f_p, V_p; then for each switch
-    its margin g, g_x, g_xd, g_t, and whether it is looked at; then g_p, by switches, for each parameter and the free
+    its margin g, g_x, g_xd, g_t, and whether it is evaluated; then g_p, by switches, for each parameter and the free
     length; last f_t. Margins and their slopes are divided by `_near`. Raises TooManySwitchesError.
     """
     found = _smooth(force, energy, damping, names)
@@ -192,7 +192,7 @@ def _near(margin: Expression) -> Expression:
 
 
 def lowest_of(margins: list[Expression], switches: tuple[Switch, ...]) -> Expression:
-    """The smallest margin of the switches that are looked at, each with the sign that its mode makes positive."""
+    """The smallest margin of the switches that are evaluated, each with the sign that its mode makes positive."""
     lowest = NONE
     for place, (margin, switch) in enumerate(zip(margins, switches, strict=True)):
         signed = choose(is_set(place), margin, negate(margin))
@@ -203,7 +203,7 @@ def lowest_of(margins: list[Expression], switches: tuple[Switch, ...]) -> Expres
 
 
 def limited(roots: list[tuple[Expression, Expression]]) -> list[Guard]:
-    """The operations that may have no value, of formulas that are looked at where the other number is 1."""
+    """The operations that may have no value, of formulas that are evaluated where the other number is 1."""
     ways = ways_to(*roots)
     return [Guard(part, way) for part, way in ways.items() if _may_fail(part) and not is_number(way, 0.0)]
 

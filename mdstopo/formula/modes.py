@@ -40,7 +40,7 @@ class TooManySwitchesError(Exception):
 
 
 class Switch(NamedTuple):
-    """margin: an expression whose sign the bit tells; relevant: of bits, 1 where the switch is looked at, else 0."""
+    """margin: an expression whose sign the bit tells; relevant: of bits, 1 where the switch is evaluated, else 0."""
 
     margin: Expression
     relevant: Expression
@@ -164,7 +164,7 @@ def _bits(root: Expression) -> bool:
 
 
 def _reached(formulas: tuple[Expression, ...], margins: tuple[Expression, ...]) -> list[Expression]:
-    """Of each switch, from the bits: 1 where a formula looks at it, by itself or through a switch that is looked at."""
+    """Of each switch, from the bits: 1 where a formula needs it, by itself or through a switch that is evaluated."""
     relevant = [ZERO] * len(margins)
     for root in formulas:
         _note(root, ONE, relevant)
@@ -175,7 +175,7 @@ def _reached(formulas: tuple[Expression, ...], margins: tuple[Expression, ...]) 
 
 
 def _note(root: Expression, reached: Expression, relevant: list[Expression]) -> None:
-    """Add where a formula looks at switches, if it is looked at itself where `reached` is 1."""
+    """Add where a formula needs switches, if it is evaluated itself where `reached` is 1."""
     for part, way in ways_to((root, reached)).items():
         if part.operator == "if" and part.operands[0].operands[1] is HALF and _bits(part.operands[0]):
             place = int(part.operands[0].operands[0].word.removeprefix("bit "))
@@ -183,9 +183,9 @@ def _note(root: Expression, reached: Expression, relevant: list[Expression]) -> 
 
 
 def ways_to(*roots: tuple[Expression, Expression]) -> dict[Expression, Expression]:
-    """Of every part of some formulas, 1 where it is looked at; of the formulas themselves that is stated with them.
+    """Of every part of some formulas, 1 where it is evaluated; of the formulas themselves that is stated with them.
 
-    Of what an `if` chooses from, one is looked at.
+    Of what an `if` chooses from, one is evaluated.
     """
     order = list(parts(*(root for root, _ in roots)))
     ways = dict.fromkeys(order, ZERO)

@@ -225,7 +225,7 @@ class _Parser:
         return self.made(sign, sign.text, left, self.sum())
 
     def taken(self, *texts: str) -> Token | None:
-        """The next token, where it is one of some signs, is gone past."""
+        """Go past the next token if it is one of these signs; the token, or None."""
         token = self.tokens[self.place]
         if token.kind != "sign" or token.text not in texts:
             return None

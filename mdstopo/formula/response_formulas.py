@@ -24,7 +24,7 @@ class ResponseProgram(NamedTuple):
     """Groups of formulas of a response.
 
     parts: how many groups its slopes by responses take; those of a margin follow its value, which is a group with its
-    slope by t and whether it is looked at. switches: how many kinks and jumps it has.
+    slope by t and whether it is evaluated. switches: how many kinks and jumps it has.
     is_timed: whether t is in it. is_norm: whether it is a root (times a number above 0), which has a kink at zero.
     """
 

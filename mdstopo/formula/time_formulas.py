@@ -14,7 +14,7 @@ from mdstopo.formula.modes import smooth
 from mdstopo.formula.parser import TIME, parse
 from mdstopo.formula.values import value_of
 
-#: group of value, rate and second derivative; that of the smallest margin; those of a switch: margin, rate, looked at
+#: group of value, rate and second derivative; that of the smallest margin; those of a switch: margin, rate, evaluated
 VALUE, LOWEST, MARGIN = 0, 1, 2
 
 

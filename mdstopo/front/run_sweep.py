@@ -118,43 +118,14 @@ def run_sweep(
         began = time.perf_counter()
         for case in cases:
             compile_apart(case, tell)
-        stop = stop_requested or never
-        saver = Checkpointer(lambda: sweep.checkpoint(place, tell))
-        due = [i for i, key in enumerate(sweep.runs) if key not in solved]
         sweep.solved = solved
-        pool: Pool | None = None
+        wanted = cores() if workers is None else workers
+        pools = _Pools(Setting(base, case_key(base)), stop_requested or never, wanted, cluster, worth, tell)
         try:
-            while due:
-                jobs = [Trial(cases[i], sweep.runs[i]) for i in due]
-                if pool is None:
-                    setting = Setting(base, case_key(base))
-                    wanted = cores() if workers is None else workers
-                    if cluster is not None:
-                        pool = Cluster(setting, stop, cluster)
-                    else:
-                        pool = Here(setting, stop)
-                        jobs = jobs if wanted == 1 else jobs[:1]  # the time of one says who runs the others
-                count = 0
-                for k, result in pool.results(jobs):
-                    i = due[k]
-                    count += 1
-                    sweep.solved[sweep.runs[i]] = lost(cases[i], result) if isinstance(result, Lost) else result
-                    if on_progress is not None:
-                        on_progress(sweep.snapshot())
-                    saver.offer(urgent=sweep.solved[sweep.runs[i]].seconds > INTERVAL)
-                if count < len(jobs):
-                    break
-                due = [i for i in due if sweep.runs[i] not in sweep.solved]
-                if isinstance(pool, Here) and due and wanted > 1:
-                    spent = sum(each.seconds for each in sweep.solved.values()) / max(len(sweep.solved), 1)
-                    if spent * len(due) > worth:
-                        pool = Processes(setting, stop, wanted, tell)
+            sweep.solve(pools, Checkpointer(lambda: sweep.checkpoint(place, tell)), on_progress or ignore)
         except Exception as error:  # what is finished is worth keeping, whatever it is that cannot go on
             sweep.save(place, RunStatus.INTERRUPTED, str(error) or type(error).__name__)
             raise
-        finally:
-            if pool is not None:
-                pool.close()
         whole = all(key in sweep.solved for key in sweep.runs)
         status, reason = sweep.verdict() if whole else (RunStatus.INTERRUPTED, "stopped; what is finished is saved")
         sweep.warnings = sweep.stalled() if whole else ()
@@ -181,6 +152,33 @@ def _cases(
     return cases
 
 
+@dataclass(frozen=True)
+class _Pools:
+    """Who does the runs.
+
+    setting: what they have in common. stop: asked whether to stop. workers: processes at most. cluster: the address of
+    a Dask scheduler in their place. worth: seconds of work from which on workers are started. notify: is given
+    sentences for the user.
+    """
+
+    setting: Setting
+    stop: Callable[[], bool]
+    workers: int
+    cluster: str | None
+    worth: float
+    notify: Callable[[str], None]
+
+    def first(self) -> Pool:
+        """The pool to begin with: the cluster, or this process."""
+        return Here(self.setting, self.stop) if self.cluster is None else Cluster(self.setting, self.stop, self.cluster)
+
+    def following(self, pool: Pool, left: float) -> Pool:
+        """The pool for what is left, so many seconds of work: workers instead of this process where that pays."""
+        if isinstance(pool, Here) and self.workers > 1 and left > self.worth:
+            return Processes(self.setting, self.stop, self.workers, self.notify)
+        return pool
+
+
 class _Sweep:
     """What a sweep has reached, and how it is saved."""
 
@@ -196,6 +194,44 @@ class _Sweep:
         self.fixed: Datasets = case_part(base)
         self.provenance = Provenance.collect(command)
         self.warnings: tuple[str, ...] = ()
+
+    def due(self) -> list[int]:
+        """The runs that are still to be done."""
+        return [i for i, key in enumerate(self.runs) if key not in self.solved]
+
+    def solve(self, pools: _Pools, saver: Checkpointer, on_progress: Callable[[Snapshot], None]) -> None:
+        """Do all runs that are due, or as many as come before it is to stop."""
+        due = self.due()
+        pool: Pool | None = None
+        try:
+            while due:
+                now = due
+                if pool is None:
+                    pool = pools.first()
+                    if isinstance(pool, Here) and pools.workers > 1:
+                        now = due[:1]  # the time of one says who does the others
+                if not self.take(pool, now, saver, on_progress):
+                    break
+                due = self.due()
+                spent = sum(each.seconds for each in self.solved.values()) / max(len(self.solved), 1)
+                pool = pools.following(pool, spent * len(due))
+        finally:
+            if pool is not None:
+                pool.close()
+
+    def take(
+        self, pool: Pool, due: Sequence[int], saver: Checkpointer, on_progress: Callable[[Snapshot], None]
+    ) -> bool:
+        """Have these runs done, and take in each result as it comes; False where it is to stop before the last."""
+        count = 0
+        for k, result in pool.results([Trial(self.cases[i], self.runs[i]) for i in due]):
+            i = due[k]
+            count += 1
+            found = lost(self.cases[i], result) if isinstance(result, Lost) else result
+            self.solved[self.runs[i]] = found
+            on_progress(self.snapshot())
+            saver.offer(urgent=found.seconds > INTERVAL)
+        return count == len(due)
 
     def stalled(self) -> tuple[str, ...]:
         """The warning about runs that stalled; their tolerances may differ."""

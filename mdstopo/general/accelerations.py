@@ -4,7 +4,8 @@
     [Phi_q   0 ] [lam] = [-gamma]
 
 for the free coordinates; what is driven has a known acceleration and moves to the right side. The unknowns stand in an
-order in which the matrix is banded (`place`), so a chain of bodies costs what its length costs. With tangents added,
+order in which the matrix is banded (`unknown_index`), so a chain of bodies costs what its length costs. With tangents
+added,
 
     W(w_q, w_v) = [M + w_q K + w_v C,  Phi_q^T; Phi_q + w_q G_q + w_v G_v,  0]
 
@@ -102,7 +103,7 @@ def make_workspace(model):
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
     n_joint = model.joint.shape[0]
-    total = model.place.shape[0]
+    total = model.unknown_index.shape[0]
     both = pair_freedoms(model)
     rows = most_rows(model)
     tangents = np.zeros((2, n // freedoms(model), shift_size(model)))
@@ -237,7 +238,7 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, tangents, transp
     band[:] = 0.0
     scale = workspace.scale
     for d in range(n):
-        scale[model.place[d]] = 1.0 / np.sqrt(model.mass[d]) if model.free[d] != 0 else 1.0
+        scale[model.unknown_index[d]] = 1.0 / np.sqrt(model.mass[d]) if model.free[d] != 0 else 1.0
     for j in range(model.joint.shape[0]):
         for r in range(most_rows(model)):
             if model.row[j, r] >= 0:
@@ -246,20 +247,20 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, tangents, transp
                     column = place_in_joint(model, j, i)
                     if model.free[column] != 0:
                         size += workspace.jac[j, r, i] ** 2 / model.mass[column]
-                scale[model.place[n + model.row[j, r]]] = 1.0 / np.sqrt(size) if size > 0.0 else 1.0
+                scale[model.unknown_index[n + model.row[j, r]]] = 1.0 / np.sqrt(size) if size > 0.0 else 1.0
     for d in range(n):
-        p = model.place[d]
+        p = model.unknown_index[d]
         band[p, half] = 1.0
         if tangent and model.free[d] != 0:
             for r in range(rotations(model)):
                 angle = place_of_turn(model, d, r)
                 slope = turn_slope_by_shift(model, turn, d, r, tangents, d // freedoms(model))
                 if model.free[angle] != 0 and slope != 0.0:
-                    put(band, half, scale, p, model.place[angle], -w_q * slope, transposed)
+                    put(band, half, scale, p, model.unknown_index[angle], -w_q * slope, transposed)
             for r in range(rotations(model), load_slopes(model)):
                 angle = place_of_turn(model, d, r - rotations(model))
                 if model.free[angle] != 0 and turn[d, r] != 0.0:
-                    put(band, half, scale, p, model.place[angle], -w_v * turn[d, r], transposed)
+                    put(band, half, scale, p, model.unknown_index[angle], -w_v * turn[d, r], transposed)
     for p in range(model.pair.shape[0]):
         for i in range(pair_freedoms(model)):
             row = place_in_pair(model, p, i)
@@ -275,18 +276,18 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, tangents, transp
                     if damped:
                         value += w_v * c[p, i, j]
                 if value != 0.0:
-                    put(band, half, scale, model.place[row], model.place[column], value, transposed)
+                    put(band, half, scale, model.unknown_index[row], model.unknown_index[column], value, transposed)
     for j in range(model.joint.shape[0]):
         for r in range(most_rows(model)):
             own = model.row[j, r]
             if own < 0:
                 continue
-            at = model.place[n + own]
+            at = model.unknown_index[n + own]
             for i in range(pair_freedoms(model)):
                 column = place_in_joint(model, j, i)
                 if model.free[column] == 0:
                     continue
-                there = model.place[column]
+                there = model.unknown_index[column]
                 force = workspace.jac[j, r, i]
                 value = force
                 if tangent:
@@ -334,17 +335,17 @@ def solve_unknowns(model, workspace, a, lam):
     n = model.mass.shape[0]
     x = workspace.x
     for d in range(n):
-        p = model.place[d]
+        p = model.unknown_index[d]
         x[p] = a[d] * workspace.scale[p] if model.free[d] != 0 else 0.0
     for r in range(lam.shape[0]):
-        p = model.place[n + r]
+        p = model.unknown_index[n + r]
         x[p] = lam[r] * workspace.scale[p]
     solve(workspace.band, model.size[1], workspace.pivots, x)
     for d in range(n):
-        p = model.place[d]
+        p = model.unknown_index[d]
         a[d] = x[p] * workspace.scale[p]
     for r in range(lam.shape[0]):
-        p = model.place[n + r]
+        p = model.unknown_index[n + r]
         lam[r] = x[p] * workspace.scale[p]
 
 

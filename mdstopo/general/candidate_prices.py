@@ -45,9 +45,9 @@ from mdstopo.sensitivity.candidate_prices import BROAD, TALL, sum_tile
 
 #: candidates of a tile, and of a call of `price_places`
 PLACES = TALL * BROAD
-#: columns of `Asked.run`
+#: columns of `PricedCandidates.run`
 SCENE, CODE, FIRST_STATE, FIRST_ENERGY, LAST_STATE, FIRST_STEP, LAST_STEP, FROM_START = range(8)
-#: columns of `Asked.step`, and what a step may be
+#: columns of `PricedCandidates.step`, and what a step may be
 FIRST_STAGE, LAST_STAGE, FIRST_NODE, KIND, MOVES = range(5)
 WHOLE, PART, POINT = range(3)
 #: fractions of a step at which a member that switches is looked at (Gauss and Lobatto), and the weights of these in the
@@ -68,7 +68,7 @@ BEGIN, PIECE_MODE, PIECE_SET = range(3)
 PIECE = 3
 CHANGES = 4
 HALVINGS = 40
-#: arrays of states in `Asked`, and of steps and nodes
+#: arrays of states in `PricedCandidates`, and of steps and nodes
 ARRAYS = (
     "pose", "change", "pose_a", "energy", "when", "level", "step", "step_time", "node_pose", "node_a", "node_change",
     "node_level", "node_energy",
@@ -77,14 +77,14 @@ ARRAYS = (
 AT_ONCE = 32
 
 
-class Asked(NamedTuple):
-    """The candidates of a group, and what the laws of its members are asked for: by scenes, and by runs of states."""
+class PricedCandidates(NamedTuple):
+    """The candidates of a group, and the states from which their prices follow: by scenes, and by runs of states."""
 
     run: Annotated[
         IndexArray,
         Field(
             "n_run, 8",
-            "of the states that one law of one scene is asked for in: the scene; the law's code; the first state, the "
+            "of the states in which one law of one scene is evaluated: the scene; the law's code; the first state, the "
             "first one whose energy counts, and the one behind all; of a law that switches the first step, and the one "
             "behind all; whether it acts from the start",
         ),
@@ -128,28 +128,28 @@ class Asked(NamedTuple):
     second_place: Annotated[FloatArray, Field("n_axis, n_second", "likewise of the other grid")]
 
 
-class AskedView:
-    """An `Asked` inside kernels, made by `unpack_asked`."""
+class PricedCandidatesView:
+    """A `PricedCandidates` inside kernels, made by `unpack_candidates`."""
 
     def __init__(self, *_arrays: Any) -> None: ...
 
 
-FIELDS = Fields(Asked)
-bundle(AskedView, FIELDS.names)
+FIELDS = Fields(PricedCandidates)
+bundle(PricedCandidatesView, FIELDS.names)
 
 
-@views_of(FIELDS, AskedView, kernel)
-def unpack_asked(ints, floats):
-    """The `Asked` whose arrays are views of the packed ones."""
+@views_of(FIELDS, PricedCandidatesView, kernel)
+def unpack_candidates(ints, floats):
+    """The `PricedCandidates` whose arrays are views of the packed ones."""
 
 
 @entry
-def price_places(ints, floats, asked_ints, asked_floats, places, out):
+def price_places(ints, floats, candidate_ints, candidate_floats, places, out):
     """The prices of single members.
 
     In:
       ints, floats: a packed scene (`pack_general`) with room for PLACES members and for the longest `curves`.
-      asked_ints, asked_floats: a packed `Asked`.
+      candidate_ints, candidate_floats: a packed `PricedCandidates`.
       places (2, M): numbers of the points of each member; M at most PLACES.
     Out:
       out (M,): derivatives by alpha.
@@ -158,16 +158,16 @@ def price_places(ints, floats, asked_ints, asked_floats, places, out):
     index = np.zeros((2, PLACES), np.int64)
     index[:, : places.shape[1]] = places
     price = np.empty(PLACES)
-    _price(model, unpack_asked(asked_ints, asked_floats), index, np.int64(0), np.empty(PLACES), price)
+    _price(model, unpack_candidates(candidate_ints, candidate_floats), index, np.int64(0), np.empty(PLACES), price)
     out[:] = price[: out.shape[0]]
 
 
 @entry
-def price_tiles(ints, floats, asked_ints, asked_floats, common, built, places, threads, out):
+def price_tiles(ints, floats, candidate_ints, candidate_floats, common, built, places, threads, out):
     """Go through every point of the one grid with every point of another.
 
     In:
-      ints, floats, asked_ints, asked_floats: as of `price_places`.
+      ints, floats, candidate_ints, candidate_floats: as of `price_places`.
       common (COMMON,): what candidates have in common, as of `sensitivity.candidate_prices`.
       built (T + 1,), places (any,): by tile, where in it candidates are that do not count.
       threads: that share the work.
@@ -175,24 +175,24 @@ def price_tiles(ints, floats, asked_ints, asked_floats, common, built, places, t
       out (strips, tiles, TILE_NUMBERS): of each tile what is kept of it; strips tiles = T.
     """
     counter = np.zeros(1, np.int64)
-    job = (counter, ints, floats, asked_ints, asked_floats, common, built, places, out)
+    job = (counter, ints, floats, candidate_ints, candidate_floats, common, built, places, out)
     shared(_price_strips, threads, job)
 
 
 @kernel
-def _price_strips(counter, ints, floats, asked_ints, asked_floats, common, built, places, out):
+def _price_strips(counter, ints, floats, candidate_ints, candidate_floats, common, built, places, out):
     """Price strip after strip, until none is left: what each thread does.
 
     In:
       counter (1,): strips that some thread has taken so far; counted on.
-      ints, floats, asked_ints, asked_floats, common, built, places: as of `price_tiles`.
+      ints, floats, candidate_ints, candidate_floats, common, built, places: as of `price_tiles`.
     Out:
       out (strips, tiles, TILE_NUMBERS): as of `price_tiles`.
     """
     model = unpack_general(ints, floats.copy())
-    asked = unpack_asked(asked_ints, asked_floats)
-    rows = asked.first.shape[2]
-    columns = asked.second.shape[2]
+    candidates = unpack_candidates(candidate_ints, candidate_floats)
+    rows = candidates.first.shape[2]
+    columns = candidates.second.shape[2]
     index = np.zeros((2, PLACES), np.int64)
     price = np.empty(PLACES)
     length = np.empty(PLACES)
@@ -203,7 +203,7 @@ def _price_strips(counter, ints, floats, asked_ints, asked_floats, common, built
                 for b in range(BROAD):
                     index[0, a * BROAD + b] = min(i * TALL + a, rows - 1)
                     index[1, a * BROAD + b] = min(j * BROAD + b, columns - 1)
-            _price(model, asked, index, np.int64(BROAD), length, price)
+            _price(model, candidates, index, np.int64(BROAD), length, price)
             for a in range(TALL):
                 for b in range(BROAD):
                     if i * TALL + a >= rows or j * BROAD + b >= columns:
@@ -216,12 +216,12 @@ def _price_strips(counter, ints, floats, asked_ints, asked_floats, common, built
 
 
 @kernel
-def _price(model, asked, index, row, length, price):
+def _price(model, candidates, index, row, length, price):
     """The prices of PLACES members.
 
     In:
       model: with room for them.
-      asked: an `Asked`.
+      candidates: a `PricedCandidates`.
       index (2, PLACES): numbers of their points.
       row: how many behind each other begin at one point; 0: they do not.
     Out:
@@ -229,30 +229,30 @@ def _price(model, asked, index, row, length, price):
       length (PLACES,): their lengths as stated (m).
       price (PLACES,): derivatives by alpha.
     """
-    axes = asked.first.shape[1]
+    axes = candidates.first.shape[1]
     member_state = np.zeros((3, PLACES))
-    _lengths(asked.first_place, asked.second_place, index, length)
+    _lengths(candidates.first_place, candidates.second_place, index, length)
     start = np.empty(PLACES)
     stated = np.empty(PLACES)
     price[:] = 0.0
     before = np.int64(-1)
-    for k in range(asked.run.shape[0]):
-        scene = asked.run[k, SCENE]
+    for k in range(candidates.run.shape[0]):
+        scene = candidates.run[k, SCENE]
         if scene != before:
             for d in range(axes):
                 for i in range(PLACES):
-                    model.member[d, i] = asked.first[scene, d, index[0, i]]
-                    model.member[axes + d, i] = asked.second[scene, d, index[1, i]]
-            for i in range(asked.curves.shape[1]):
-                model.curves[i] = asked.curves[scene, i]
-            _lengths(asked.first_home[scene], asked.second_home[scene], index, start)
-            _lengths(asked.first_stated[scene], asked.second_stated[scene], index, stated)
+                    model.member[d, i] = candidates.first[scene, d, index[0, i]]
+                    model.member[axes + d, i] = candidates.second[scene, d, index[1, i]]
+            for i in range(candidates.curves.shape[1]):
+                model.curves[i] = candidates.curves[scene, i]
+            _lengths(candidates.first_home[scene], candidates.second_home[scene], index, start)
+            _lengths(candidates.first_stated[scene], candidates.second_stated[scene], index, stated)
             before = scene
         for i in range(PLACES):
-            free = stated[i] if asked.rest[k] < 0.0 else asked.rest[k]
+            free = stated[i] if candidates.rest[k] < 0.0 else candidates.rest[k]
             model.member[MEMBER_FREE_LENGTH, i] = free
             model.member[MEMBER_EXCESS, i] = (start[i] - free) * (start[i] + free)
-        _price_run(model, asked, k, row, member_state, price)
+        _price_run(model, candidates, k, row, member_state, price)
 
 
 @kernel
@@ -267,24 +267,24 @@ def _lengths(first, second, index, out):
 
 
 @kernel
-def _price_run(model, asked, k, row, member_state, price):
+def _price_run(model, candidates, k, row, member_state, price):
     """Add what members do by one law in the states of a run.
 
     In:
       model: with the members.
-      asked, k: an `Asked`, and the number of the run.
+      candidates, k: a `PricedCandidates`, and the number of the run.
       row: members behind each other that begin at one point, or 0.
       member_state (3, PLACES): zeros; no member of a law that does not switch has a mode.
     Out:
       price (PLACES,): added to.
     """
-    pose = asked.pose
-    change = asked.change
-    run = asked.run[k]
-    p = asked.law[k]
+    pose = candidates.pose
+    change = candidates.change
+    run = candidates.run[k]
+    p = candidates.law[k]
     code = run[CODE]
     if run[LAST_STEP] > run[FIRST_STEP]:
-        _price_switching(model, asked, k, price)
+        _price_switching(model, candidates, k, price)
         return
     elastic = code == SPRING and p[1] == 0.0 and p[2] == 0.0
     begin = run[FIRST_STATE]
@@ -296,36 +296,36 @@ def _price_run(model, asked, k, row, member_state, price):
             )
             begin = end
     for s in range(begin, run[LAST_STATE]):
-        weight = asked.energy[s] if s >= run[FIRST_ENERGY] else 0.0
+        weight = candidates.energy[s] if s >= run[FIRST_ENERGY] else 0.0
         if elastic and has_spring_energies(model):
             spring_energies(model, p, np.int64(0), np.int64(PLACES), pose[s : s + 1], np.int64(0), weight, price)
         elif code == INERTER:
-            _add_inertial(model, p[0], pose[s, 0], change[s, 0], asked.pose_a[s], price)
+            _add_inertial(model, p[0], pose[s, 0], change[s, 0], candidates.pose_a[s], price)
         else:
             member_designs(
-                model, code, p, np.int64(0), np.int64(PLACES), asked.when[s], asked.level[s], member_state,
+                model, code, p, np.int64(0), np.int64(PLACES), candidates.when[s], candidates.level[s], member_state,
                 member_state[MODE], pose[s, 0], change[s, 0], weight, price,
             )  # fmt: skip
 
 
 @kernel
-def _price_switching(model, asked, k, price):
+def _price_switching(model, candidates, k, price):
     """Add what members of a law that switches do in the steps of a run.
 
     In:
       model: with the members.
-      asked, k: an `Asked`, and the number of the run.
+      candidates, k: a `PricedCandidates`, and the number of the run.
     Out:
       price (PLACES,): added to.
     """
     node = np.empty((NODE_ROWS, NODES))
     pieces = np.empty((CHANGES + 1, PIECE))
     for i in range(PLACES):
-        price[i] += _price_followed(model, asked, k, i, node, pieces)
+        price[i] += _price_followed(model, candidates, k, i, node, pieces)
 
 
 @kernel
-def _price_followed(model, asked, k, i, node, pieces):
+def _price_followed(model, candidates, k, i, node, pieces):
     """What member i of a law that switches does in the steps of a run.
 
     A step in which it stays in its mode is summed over its stages, as for a member that is built. In a step in which
@@ -334,15 +334,15 @@ def _price_followed(model, asked, k, i, node, pieces):
 
     In:
       model: with the members.
-      asked, k, i: an `Asked`, the number of the run, and the member.
+      candidates, k, i: a `PricedCandidates`, the number of the run, and the member.
     Scratch:
       node (NODE_ROWS, NODES): the member at the nodes of a step.
       pieces (CHANGES + 1, PIECE): pieces of a step in which it stays in a mode.
 
     Returns its part of the derivative by alpha.
     """
-    run = asked.run[k]
-    p = asked.law[k]
+    run = candidates.run[k]
+    p = candidates.law[k]
     code = run[CODE]
     rest = model.member[MEMBER_FREE_LENGTH, i]
     remembers = law_remembers(code)
@@ -354,41 +354,41 @@ def _price_followed(model, asked, k, i, node, pieces):
     pieces[0, PIECE_SET] = 0.0
     last = 0
     for s in range(run[FIRST_STEP], run[LAST_STEP]):
-        step = asked.step[s]
+        step = candidates.step[s]
         if step[KIND] == POINT:
             o = step[FIRST_STAGE]
-            length, x, rate = member_motion(model, i, asked.pose[o, 0])
+            length, x, rate = member_motion(model, i, candidates.pose[o, 0])
             if not length > 0.0:
                 continue
             now = int(pieces[last, PIECE_MODE])
             own = pieces[last, PIECE_SET]
             if not begun or not remembers:
-                second = second_rate(model, i, asked.pose[o, 0], asked.pose_a[o])
-                now = law_start(code, p, x, rate, second, asked.when[o], model.curves, rest)
+                second = second_rate(model, i, candidates.pose[o, 0], candidates.pose_a[o])
+                now = law_start(code, p, x, rate, second, candidates.when[o], model.curves, rest)
                 own = law_first_set(code, p, x, now)
-            worked, stored = _at_state(model, asked, code, p, i, o, now, own)
+            worked, stored = _at_state(model, candidates, code, p, i, o, now, own)
             total += worked + stored
             continue
         if step[MOVES] == 0 and not remembers:
             continue
-        _fill_nodes(model, asked, i, step[FIRST_NODE], node)
+        _fill_nodes(model, candidates, i, step[FIRST_NODE], node)
         if not begun or not remembers:
-            t = asked.step_time[s, 0]
+            t = candidates.step_time[s, 0]
             mode = law_start(code, p, node[X, 0], node[RATE, 0], node[SECOND, 0], t, model.curves, rest)
             kept = law_first_set(code, p, node[X, 0], mode)
             begun = np.bool_(True)
         pieces[0, BEGIN] = 0.0
         pieces[0, PIECE_MODE] = mode
         pieces[0, PIECE_SET] = kept
-        last = _follow(code, p, model.curves, rest, asked.step_time[s], node, pieces)
+        last = _follow(code, p, model.curves, rest, candidates.step_time[s], node, pieces)
         if last == 0:
             for o in range(step[FIRST_STAGE], step[LAST_STAGE]):
-                worked, stored = _at_state(model, asked, code, p, i, o, mode, kept)
+                worked, stored = _at_state(model, candidates, code, p, i, o, mode, kept)
                 total += worked + stored
         else:
             for at in range(last + 1):
                 end = pieces[at + 1, BEGIN] if at < last else 1.0
-                total += _over_piece(model, asked, code, p, rest, s, node, pieces[at], end)
+                total += _over_piece(model, candidates, code, p, rest, s, node, pieces[at], end)
         if step[KIND] == WHOLE:
             mode = int(pieces[last, PIECE_MODE])
             kept = pieces[last, PIECE_SET]
@@ -396,44 +396,44 @@ def _price_followed(model, asked, k, i, node, pieces):
 
 
 @kernel
-def _at_state(model, asked, code, p, i, o, mode, kept):
+def _at_state(model, candidates, code, p, i, o, mode, kept):
     """What member i does at a state: its force times the virtual change, and its energy times the weight there.
 
     model: with the members.
-    asked: an `Asked`.
+    candidates: a `PricedCandidates`.
     code, p (8,): of the law.
     i, o: numbers of the member and of the state.
     mode, kept: the mode that the member is in, and its permanent set (m).
     """
-    length, x, along = member_work(model, i, asked.pose[o, 0], asked.change[o, 0])
+    length, x, along = member_work(model, i, candidates.pose[o, 0], candidates.change[o, 0])
     if not length > 0.0:
         return 0.0, 0.0
-    _, _, rate = member_motion(model, i, asked.pose[o, 0])
+    _, _, rate = member_motion(model, i, candidates.pose[o, 0])
     f, _, _, energy, _ = law(
-        code, p, x - kept, rate, mode, asked.when[o], asked.level[o], model.curves,
+        code, p, x - kept, rate, mode, candidates.when[o], candidates.level[o], model.curves,
         model.member[MEMBER_FREE_LENGTH, i],
     )  # fmt: skip
-    return f * along, asked.energy[o] * energy
+    return f * along, candidates.energy[o] * energy
 
 
 @kernel
-def _fill_nodes(model, asked, i, first, node):
+def _fill_nodes(model, candidates, i, first, node):
     """Elongation of member i, its two rates, its part of the virtual change, and the rest of `node`, at a step's nodes.
 
     model: with the members.
-    asked, first: an `Asked`, and the number of the first node.
+    candidates, first: a `PricedCandidates`, and the number of the first node.
     node (NODE_ROWS, NODES): set.
     """
     for m in range(NODES):
-        r = asked.node_pose[first + m]
+        r = candidates.node_pose[first + m]
         length, x, rate = member_motion(model, i, r)
-        _, _, along = member_work(model, i, r, asked.node_change[first + m])
+        _, _, along = member_work(model, i, r, candidates.node_change[first + m])
         node[X, m] = x
         node[RATE, m] = rate
-        node[SECOND, m] = second_rate(model, i, r, asked.node_a[first + m]) if length > 0.0 else 0.0
+        node[SECOND, m] = second_rate(model, i, r, candidates.node_a[first + m]) if length > 0.0 else 0.0
         node[ALONG, m] = along
-        node[LEVEL, m] = asked.node_level[first + m]
-        node[WEIGHT, m] = asked.node_energy[first + m]
+        node[LEVEL, m] = candidates.node_level[first + m]
+        node[WEIGHT, m] = candidates.node_energy[first + m]
 
 
 @kernel
@@ -515,12 +515,12 @@ def _follow(code, p, curves, rest, time, node, pieces):
 
 
 @kernel
-def _over_piece(model, asked, code, p, rest, s, node, piece, end):
+def _over_piece(model, candidates, code, p, rest, s, node, piece, end):
     """The integral over a mode's piece of its force times the member's part of the virtual change, and of its energy
     times the weight of that.
 
     model: with the members.
-    asked, s: an `Asked`, and the number of the step.
+    candidates, s: a `PricedCandidates`, and the number of the step.
     code, p (8,), rest: the law, and the member's free length (m).
     node (NODE_ROWS, NODES): the member at the nodes.
     piece (PIECE,), end: the mode's piece, and the fraction of the step at which it ends.
@@ -531,7 +531,7 @@ def _over_piece(model, asked, code, p, rest, s, node, piece, end):
         c = begin + (end - begin) * GAUSS[0, g]
         f, _, _, energy, _ = law(
             code, p, between_nodes(node[X], c) - piece[PIECE_SET], between_nodes(node[RATE], c),
-            int(piece[PIECE_MODE]), asked.step_time[s, 0] + c * asked.step_time[s, 1],
+            int(piece[PIECE_MODE]), candidates.step_time[s, 0] + c * candidates.step_time[s, 1],
             between_nodes(node[LEVEL], c), model.curves, rest,
         )  # fmt: skip
         total += GAUSS[1, g] * (f * between_nodes(node[ALONG], c) + energy * between_nodes(node[WEIGHT], c))

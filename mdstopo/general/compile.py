@@ -91,24 +91,9 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     index = {name: i for i, name in enumerate(names)}
     each = bodies.freedoms
     n = each * len(names)
-    mass, v0 = np.ones(n), np.zeros(n)
-    home = dimension.home(load_case, len(names))
-    frames = dimension.frames(load_case)
-    for i, body in enumerate(load_case.bodies):
-        own = slice(each * i, each * (i + 1))
-        mass[own] = dimension.masses(body)
-        v0[own] = dimension.velocities(body, home[i])
-
-    fine = has_coarse_steps(case.solver)
-    kinks_of_formulas = kink_times(case, load_case)
-    more = (
-        kinks_of_formulas
-        + integration_times(case, load_case, kinks_of_formulas)
-        + lasting_times(case, fine)
-        + motion_times(load_case, dimension)
-        + watched_times(case, load_case)
-    )
-    times = breakpoints(load_case, more)
+    home, frames = dimension.home(load_case, len(names)), dimension.frames(load_case)
+    mass, v0 = _masses_and_velocities(load_case, dimension, home)
+    times = breakpoints(load_case, _more_times(case, load_case, dimension))
     made = drives(load_case, times, dimension, dimension.stated(home), v0, home)
     _refuse_impacts(case, load_case, bodies, made, times)
     free = np.ones(n, dtype=np.int64)
@@ -145,11 +130,10 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         **members, times=times, **loads._asdict(), **timed._asdict(),
         driven_par=made.formulas, driven_mode=made.modes, bushing_pair=bushing_pair, bushing=bushing,
         driven=made.driven, drive=made.cubics, drive_frame=made.frames, drive_turn=made.turns,
-        joint=joint, joint_par=joint_par, row=layout.row, place=layout.place,
+        joint=joint, joint_par=joint_par, **layout.fields(),
         size=np.array(
-            [*layout.size, int(by_order_8), len(layout.steady), bodies.load_slopes, bodies.attitude], dtype=np.int64
-        ), line=layout.line,
-        envelope=layout.envelope, product=layout.product, steady=layout.steady,
+            [*layout.size, int(by_order_8), len(layout.schur_constant), bodies.load_slopes, bodies.attitude], np.int64
+        ),
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
         varied=entries, along=along(entries),
     )  # fmt: skip
@@ -158,6 +142,31 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         load_case, model, names, len(names) - 1, damped, skipped, layout.redundant, responses, reductions, bodies,
         contact_words,
     )  # fmt: skip
+
+
+def _masses_and_velocities(
+    load_case: LoadCase, dimension: Dimension, home: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Masses and start velocities (n,) of all bodies; home (n_body, n_home): where they stand, ground last."""
+    each = dimension.kinematics.freedoms
+    mass, v0 = np.ones(each * len(home)), np.zeros(each * len(home))
+    for i, body in enumerate(load_case.bodies):
+        own = slice(each * i, each * (i + 1))
+        mass[own] = dimension.masses(body)
+        v0[own] = dimension.velocities(body, home[i])
+    return mass, v0
+
+
+def _more_times(case: Case, load_case: LoadCase, dimension: Dimension) -> list[float]:
+    """Times at which steps end beside rows of tables of loads (s)."""
+    kinks_of_formulas = kink_times(case, load_case)
+    return (
+        kinks_of_formulas
+        + integration_times(case, load_case, kinks_of_formulas)
+        + lasting_times(case, has_coarse_steps(case.solver))
+        + motion_times(load_case, dimension)
+        + watched_times(case, load_case)
+    )
 
 
 def _refuse_impacts(case: Case, load_case: LoadCase, bodies: Kinematics, made: Drives, times: FloatArray) -> None:

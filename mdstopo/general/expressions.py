@@ -99,7 +99,7 @@ def formula_value(model, j, who, p, t, slopes):
 
 @kernel
 def formula_mode(model, j, p, t):
-    """Bits of the switches of an expression at values p of the responses that it is of; 0 of those not looked at.
+    """Bits of the switches of an expression at values p of the responses that it is of; 0 of those not evaluated.
 
     model, j: the compiled scene, and which response.
     p (numbers_of,): values of the responses, then its parameters.

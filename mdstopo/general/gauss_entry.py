@@ -1,14 +1,6 @@
-"""What the driver calls of Gauss collocation for general scenes."""
+"""What is Gauss collocation's own of the entries for general scenes (`entries`)."""
 
 import mdstopo.general.gauss_sensitivity  # noqa: F401  (enters the method's functions)
-from mdstopo.general.dense_output import compare, sample_response
-from mdstopo.general.direct import follow, push
 from mdstopo.general.gauss import TAG, simulate
-from mdstopo.general.integral_gradients import integral_with_gradient
-from mdstopo.general.peak_search import peaks_of_pieces, peaks_of_steps, rank_rows
-from mdstopo.general.row_sweep import rows_vjp
 
-__all__ = [
-    "TAG", "compare", "follow", "integral_with_gradient", "peaks_of_pieces", "peaks_of_steps", "push", "rank_rows",
-    "rows_vjp", "sample_response", "simulate",
-]  # fmt: skip
+__all__ = ["TAG", "simulate"]

@@ -2,15 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.integrators import IntegratorKind
-from mdstopo.case.memory import most_floats
+from mdstopo.case.memory import most_floats, room_factor
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.case.responses import kind_of
 from mdstopo.evaluation import USUAL, Rows, Shape
@@ -30,7 +27,7 @@ from mdstopo.general.extremes import (
 from mdstopo.general.kinks import landed
 from mdstopo.general.minima import Pieces, minima
 from mdstopo.general.model import COUNT, GROUP, INERTER, JOINT_FIRST, OFFSET, START, GeneralModel, pack_general
-from mdstopo.general.quadrature_breakpoints import INTEGRALS, ROUNDS, quadrature_breakpoints, reduced
+from mdstopo.general.quadrature_breakpoints import ROUNDS, quadrature_breakpoints, reduced
 from mdstopo.general.ready import Ready
 from mdstopo.general.responses import switches_of
 from mdstopo.general.row_gradients import RowGradients
@@ -41,7 +38,7 @@ from mdstopo.general.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.turning_drives import global_moments
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
-from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
+from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult
 from mdstopo.integrators.steps import (
     CHATTERING,
     HALF_TURN,
@@ -57,11 +54,14 @@ from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.diagnosis import fastest_body, member_in_words
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.modes import Modes
+from mdstopo.scene.settled import Settled
+from mdstopo.sensitivity.reductions import INTEGRALS
+from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
-    from mdstopo.general.pricing import AskedOfMembers, GeneralCandidates
-    from mdstopo.general.settle import Settled
+    from mdstopo.general.entries import Entries
+    from mdstopo.general.pricing import GeneralCandidates, PricingStates
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
@@ -69,15 +69,8 @@ ROWS = 6
 PEAKS = {"max": False, "max_abs": True}
 #: of which peaks: those of g, of -g
 SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
-#: growth of the room for steps below which a run ends instead
-WORTH = 1.05
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
-
-
-def load_method(kind: IntegratorKind) -> ModuleType:
-    """The compiled entries of a method for general scenes."""
-    return import_module(kind.general)
 
 
 class GeneralDriver:
@@ -125,7 +118,7 @@ class GeneralDriver:
         #: where the steps of the last evaluation had to end
         self.quadrature_breakpoints: list[float] = []
         self._inertial = bool(np.any(model.block[:, 3] == INERTER))
-        self._entry: Any = None
+        self._entry: Entries | None = None
         self._message = ""
         self._allowed = MAX_STEPS
         self._make_room(method.steps, method.stages, 64)
@@ -144,10 +137,12 @@ class GeneralDriver:
         return self._values
 
     @property
-    def entry(self) -> Any:
+    def entry(self) -> "Entries":
         """The method's compiled entries, imported when first used."""
         if self._entry is None:
-            self._entry = load_method(self.method.kind)
+            from mdstopo.general.entries import entries_of
+
+            self._entry = entries_of(self.method.kind)
         return self._entry
 
     def pack(self, model: GeneralModel) -> tuple[IndexArray, FloatArray]:
@@ -176,8 +171,8 @@ class GeneralDriver:
 
     def _grow(self) -> bool:
         """Make twice the room, or as much as memory has; False where that is hardly more."""
-        factor = min(2.0, most_floats() / len(self.room))
-        if factor < WORTH:
+        factor = room_factor(len(self.room))
+        if factor == 1.0:
             return False
         self._make_room(*(int(factor * int(size)) for size in self.limits[1:4]))
         return True
@@ -563,7 +558,7 @@ class GeneralDriver:
 
         return start_modes(self, alpha)
 
-    def settled(self, alpha: FloatArray) -> "Settled | None":
+    def settled(self, alpha: FloatArray) -> Settled | None:
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
         return self.start.settled if self.start is not None and self.settle(alpha) else None
 
@@ -597,11 +592,11 @@ class GeneralDriver:
         more = self.quadrature_breakpoints
         return landed(self.with_start(), more) if more else self._model
 
-    def asked_of_members(self, factor: FloatArray) -> "AskedOfMembers":
-        """What rows of the last evaluation, each times its factor (n_resp, R), ask of any member; with gradients."""
-        from mdstopo.general.pricing import asked_of
+    def pricing_states(self, factor: FloatArray) -> "PricingStates":
+        """The states from which prices follow, of the rows of the last evaluation times factor (n_resp, R)."""
+        from mdstopo.general.pricing import pricing_states_of
 
-        return asked_of(self, factor)
+        return pricing_states_of(self, factor)
 
     @property
     def times(self) -> FloatArray:
@@ -674,9 +669,9 @@ class GeneralDriver:
         """The joint whose row stands at a place of the matrix, or the body whose coordinate does."""
         model = self.scene.model
         n = len(model.mass)
-        if place >= len(model.place):
-            return describe(self.case.joints[place - len(model.place)])
-        unknown = int(np.flatnonzero(model.place == place)[0])
+        if place >= len(model.unknown_index):
+            return describe(self.case.joints[place - len(model.unknown_index)])
+        unknown = int(np.flatnonzero(model.unknown_index == place)[0])
         if unknown >= n:
             return describe(self.case.joints[int(np.argwhere(model.row == unknown - n)[0, 0])])
         body = unknown // self.scene.kinematics.freedoms

@@ -29,16 +29,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 
 @kernel
 def point_of(tag, model, tables, member_state, history, count, k, c, keep, workspace, q, v, work):
-    """The cubic between the ends of step k, and its derivative; returns k.
-
-    Constant:
-      model: the compiled scene.
-      history, k, c: the history of steps, the step, and a fraction of it.
-    Out:
-      q (n_q,), v (n,): coordinates and velocities.
-
-    Not needed here: tag, tables, member_state, count, keep, workspace, work.
-    """
+    """The cubic between the ends of step k, and its derivative; see `method_interface.point_of`. Returns k."""
     h = history.t[k + 1] - history.t[k]
     cubic(model, c, h, history.q[k], history.v[k], history.q[k + 1], history.v[k + 1], q, v)
     return k
@@ -46,17 +37,7 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
 
 @kernel
 def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
-    """The cubic of step k, a little later than at fraction c.
-
-    Constant:
-      model: the compiled scene.
-      history, k, c: the history of steps, the step, and a fraction of it.
-      e: how much later (s); below 0: earlier.
-    Out:
-      q_out (n_q,), v_out (n,): coordinates and velocities then.
-
-    Not needed here: tag; q, v, a, which are those at c.
-    """
+    """The cubic of step k, a little later than at fraction c; see `method_interface.beside`."""
     h = history.t[k + 1] - history.t[k]
     cubic(model, c + e / h, h, history.q[k], history.v[k], history.q[k + 1], history.v[k + 1], q_out, v_out)
 
@@ -81,14 +62,9 @@ def is_explicit(tag):
 
 @kernel
 def weights_of(tag, model, tables, history, w, out):
-    """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion.
+    """The trapezoidal rule; see `method_interface.weights_of`.
 
-    Constant:
-      history, w: the history of steps, and the step.
-    Out:
-      out (3 or more,): weights of the step's stages (s); zero behind them.
-
-    Not needed here: tag, model, tables.
+    For an end half of each step next to it, for a stage off the motion nothing.
     """
     h = history.t[w + 1] - history.t[w]
     out[:] = 0.0
@@ -103,23 +79,9 @@ def weights_of(tag, model, tables, history, w, out):
 
 @kernel
 def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, workspace, work):
-    """Pull R cotangents of step w back to its start, in place (`method_interface`).
+    """Through the stages of step w, its end first; see `method_interface.step_back`.
 
-    Constant:
-      tag, tables (1,): the integrator; the spectral radius.
-      model: the compiled scene.
-      history, w: the history of steps, and the step.
-      c (R,): the fraction of the step to which each cotangent belongs; 1: its end.
-      bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers; no rows where
-        there are none.
-    In and out:
-      lam_q, lam_v (R, n): cotangents of coordinates and velocities.
-      lam_x (R, 2, n): those of the acceleration and of the auxiliary one.
-    Out:
-      z (R, s or more, n): the virtual displacements of the stages' balances.
-      y (n_row,): scratch.
-      workspace: workspace of a balance, overwritten.
-      work (WORK,): counts of work, added to.
+    lam_x (R, 2, n) belongs to the acceleration and the auxiliary one; tables (1,): the spectral radius.
     """
     count, n = lam_q.shape
     o = history.index[w, FIRST]
@@ -242,22 +204,9 @@ def _stage_row_back(
 
 @kernel
 def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
-    """Push changes through step w (`method_interface`).
+    """Through the stages of step w, its end last; see `method_interface.step_forward`.
 
-    Constant:
-      tag, tables (1,): the integrator; the spectral radius.
-      model: the compiled scene.
-      history, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
-      sweeps: above 0, the end is solved by so many fixed-point sweeps at most (`iterative`).
-      force (s, n): changes of the force at each stage.
-    In and out:
-      dq, dv (n,): changes of coordinates and velocities, of the start and then of the end.
-      dx (2, n): those of the acceleration and of the auxiliary one.
-    Out:
-      changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
-      workspace: workspace of a balance, overwritten.
-
-    Returns whether all sweeps settled.
+    dx (2, n) belongs to the acceleration and the auxiliary one; tables (1,): the spectral radius.
     """
     n = dq.shape[0]
     o = history.index[w, FIRST]

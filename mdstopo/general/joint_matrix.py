@@ -4,10 +4,10 @@
     [Phi_q   0 ] [lam] = [g]        a = M^-1 (f - Phi_q^T lam)
 
 As long as no inerters couple bodies, M is diagonal, and the joints' matrix is symmetric, positive definite where joints
-are independent, and has as many rows as these: its factors cost a small part of those of the whole
-balance. It couples rows that meet at a body that can move (`GeneralModel.product`). In an order of its own
-(`GeneralModel.line`) each row begins late (`GeneralModel.envelope`): before its first entry its factors have none. A
-closed loop in its natural order has short rows, and long ones where it closes.
+are independent, and has as many rows as these: its factors cost a small part of those of the whole balance. It is the
+Schur complement of M, and couples rows that meet at a body that can move (`GeneralModel.schur_product`). In an order of
+its own (`GeneralModel.row_layout`) each row begins late (`GeneralModel.skyline`): before its first entry its factors
+have none. A closed loop in its natural order has short rows, and long ones where it closes.
 
 The factors are L D L^T, which scales of rows leave as they are. Seen with rows scaled to a diagonal of ones, the joints
 are as good as singular where the smallest eigenvalue, the square of the smallest singular value of the scaled Phi_q,
@@ -69,18 +69,18 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
       diagonal (2, n_row): the diagonal of the matrix, and the inverse of D.
       x (n_row,): scratch.
 
-    Returns the place (`GeneralModel.place`) of a row at which the matrix is singular, or -1.
+    Returns the place (`GeneralModel.unknown_index`) of a row at which the matrix is singular, or -1.
     """
-    line = model.line
-    product = model.product
-    envelope = model.envelope
+    line = model.row_layout
+    product = model.schur_product
+    envelope = model.skyline
     slope = jac.reshape(jac.size)
     weighed = pull.reshape(pull.size)
     whole = spread.reshape(spread.size)
     for e in range(slope.shape[0]):
         weighed[e] = slope[e] * whole[e]
     for e in range(gram.shape[0]):
-        gram[e] = model.steady[e]
+        gram[e] = model.schur_constant[e]
     for m in range(product.shape[0]):
         gram[index(product[m, 0])] += slope[index(product[m, 1])] * weighed[index(product[m, 2])]
     at = decompose(envelope, gram, diagonal)
@@ -90,7 +90,7 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
         return -1
     for r in range(line.shape[0]):
         if line[r, 3] == at:
-            return model.place[model.mass.shape[0] + r]
+            return model.unknown_index[model.mass.shape[0] + r]
     return -1
 
 
@@ -240,8 +240,8 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
       lam (n_row,): g, then the multipliers.
       x (n_row,): scratch.
     """
-    line = model.line
-    envelope = model.envelope
+    line = model.row_layout
+    envelope = model.skyline
     weighed = pull.reshape(pull.size)
     count = line.shape[0]
     each = freedoms(model)

@@ -9,6 +9,7 @@ which is more than the step is, would turn it anywhere. Steps beside a zero are 
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from mdstopo.general.model import GeneralModel
 from mdstopo.general.responses import has_kinks, has_norm, is_expression
 from mdstopo.mechanics.kinematics.timed import COORDINATE, DERIVED
 from mdstopo.scene.model import FloatArray
+from mdstopo.scene.signals import cut_linear, parents_of
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
@@ -101,14 +103,8 @@ def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
         if not new or time - new[-1] > apart:
             new.append(time)
     whole = np.sort(np.concatenate([old, new]))
-    parent = np.clip(np.searchsorted(old, whole[:-1], side="right") - 1, 0, len(old) - 2)
-    tau = whole[:-1] - old[parent]
-
-    def linear(array: FloatArray) -> FloatArray:
-        part = array[parent].copy()
-        part[..., 0] += tau.reshape(-1, *[1] * (part.ndim - 2)) * part[..., 1]
-        return part
-
+    parent, tau = parents_of(old, whole)
+    cut = partial(cut_linear, parent=parent, tau=tau)
     d = model.drive[parent]
     x = tau[:, None]
     drive = np.stack(
@@ -129,8 +125,8 @@ def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
         active=model.active[parent],
         timed_mode=model.timed_mode[parent],
         driven_mode=model.driven_mode[parent],
-        level=linear(model.level),
-        force=linear(model.force),
-        load_force=linear(model.load_force),
+        level=cut(model.level),
+        force=cut(model.force),
+        load_force=cut(model.load_force),
         drive=drive.reshape(len(parent), *model.drive.shape[1:]),
     )

@@ -7,7 +7,7 @@ Cuthill-McKee where there are many); so are the rows alone, for the matrix that 
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,19 +23,23 @@ FEW = 30
 
 
 class Layout(NamedTuple):
-    """row, place, size[0:2], line, envelope, product, steady of `GeneralModel`.
+    """row, unknown_index, size[0:2], row_layout, skyline, schur_product, schur_constant of `GeneralModel`.
 
     redundant: names of joints with rows left out.
     """
 
     row: IndexArray
-    place: IndexArray
+    unknown_index: IndexArray
     size: tuple[int, int]
-    line: IndexArray
-    envelope: IndexArray
-    product: IndexArray
-    steady: FloatArray
+    row_layout: IndexArray
+    skyline: IndexArray
+    schur_product: IndexArray
+    schur_constant: FloatArray
     redundant: tuple[str, ...]
+
+    def fields(self) -> dict[str, Any]:
+        """The fields of `GeneralModel` that these are, but for `size`."""
+        return {name: value for name, value in self._asdict().items() if name not in ("size", "redundant")}
 
 
 def arrange(
@@ -185,7 +189,7 @@ def _products(
 
 
 def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tuple[IndexArray, IndexArray, int]:
-    """Place of each row among the rows, `GeneralModel.envelope`, and the number of entries.
+    """Place of each row among the rows, `GeneralModel.skyline`, and the number of entries.
 
     Where there are many unknowns two orders are compared, and the one that is cheaper to factorise is taken.
     """

@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdstopo.general.extremes import RATE, SIGN, parts, row_of
-from mdstopo.general.quadrature_breakpoints import INTEGRALS, reduced
+from mdstopo.general.quadrature_breakpoints import reduced
 from mdstopo.integrators.scene_driver import ResponseResult
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.model import FloatArray
 from mdstopo.sensitivity.constant_load import DROPPED
 from mdstopo.sensitivity.methods import FALLBACK
+from mdstopo.sensitivity.reductions import INTEGRALS
 from mdstopo.status import Status
 
 if TYPE_CHECKING:

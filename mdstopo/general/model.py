@@ -124,7 +124,7 @@ class GeneralModel(NamedTuple):
         FloatArray, Field("n_joint, n_par", "the joint's parameters (`mechanics.joints.table`, `spatial_joints`)")
     ]
     row: Annotated[IndexArray, Field("n_joint, rows", "the place of each of its rows among the solved ones, or -1")]
-    place: Annotated[
+    unknown_index: Annotated[
         IndexArray, Field("n_place", "where each coordinate, then each solved row, stands in the banded matrix")
     ]
     size: Annotated[
@@ -135,7 +135,7 @@ class GeneralModel(NamedTuple):
             "matrix; slopes of the loads on a body; numbers of an attitude",
         ),
     ]
-    line: Annotated[
+    row_layout: Annotated[
         IndexArray,
         Field(
             "n_place - n, 4",
@@ -143,7 +143,7 @@ class GeneralModel(NamedTuple):
             "freedom of each of its bodies, and where it stands in the joints' own matrix (`joint_matrix`)",
         ),
     ]
-    envelope: Annotated[
+    skyline: Annotated[
         IndexArray,
         Field(
             "n_place - n, 2",
@@ -151,7 +151,7 @@ class GeneralModel(NamedTuple):
             "of all rows if it reached the place 0",
         ),
     ]
-    product: Annotated[
+    schur_product: Annotated[
         IndexArray,
         Field(
             "n_product, 3",
@@ -159,7 +159,9 @@ class GeneralModel(NamedTuple):
             "mass, belongs there",
         ),
     ]
-    steady: Annotated[FloatArray, Field("size[3]", "what else it is made of: products of slopes that never change")]
+    schur_constant: Annotated[
+        FloatArray, Field("size[3]", "what else it is made of: products of slopes that never change")
+    ]
     response: Annotated[
         IndexArray, Field("n_response, 6", "kind, body, reference, component, order in time, group or joint")
     ]

@@ -17,7 +17,7 @@ from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.status import Status
 
 #: arrays of a scene that a number may change so that `follow` differentiates by it
-BALANCE = frozenset({"mass", "force", "load_force", "load_arm", "v0", "steady"})
+BALANCE = frozenset({"mass", "force", "load_force", "load_arm", "v0", "schur_constant"})
 #: times closer than this, relative to the whole, are one (`kinks.landed` has the half)
 TOGETHER = 2e-10
 

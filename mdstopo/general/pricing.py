@@ -15,7 +15,6 @@ from mdstopo.general.compile import GeneralScene
 from mdstopo.general.dimension import dimension_of, in_frame
 from mdstopo.general.extremes import COLUMNS, FRACTION, RATE, STEP
 from mdstopo.general.model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
-from mdstopo.general.quadrature_breakpoints import INTEGRALS
 from mdstopo.general.row_gradients import sign_of, wanted_rows
 from mdstopo.general.step_history import FIRST
 from mdstopo.general.variables import as_computed
@@ -25,6 +24,7 @@ from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.origin import starting_places
 from mdstopo.sensitivity.candidate_pass import CandidatePass
 from mdstopo.sensitivity.candidate_prices import TILE_NUMBERS
+from mdstopo.sensitivity.reductions import INTEGRALS
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
@@ -35,8 +35,8 @@ HIGHEST, MANY = 3, 8
 SQUARED = 2
 
 
-class AskedOfScene(NamedTuple):
-    """What a weighted sum of rows asks of members in one load case.
+class ScenePricingStates(NamedTuple):
+    """The states of one load case from which prices follow, of a weighted sum of rows.
 
     case, scene: as compiled. model: of the run, whose segments may be more than the scene's. pairs: the number of each
     pair among those that are kept. steps: where the law of a group switches. The others as of `ask_members`.
@@ -55,14 +55,14 @@ class AskedOfScene(NamedTuple):
     steps: "Steps | None"
 
 
-class AskedOfMembers(NamedTuple):
-    """What a weighted sum of rows asks of members, whatever they are: in all load cases, and all samples of a case."""
+class PricingStates(NamedTuple):
+    """The states from which the price of any member follows: of all load cases, and of all samples of a case."""
 
-    scenes: tuple[AskedOfScene, ...]
+    scenes: tuple[ScenePricingStates, ...]
 
     @classmethod
-    def of_all(cls, parts: "Sequence[AskedOfMembers]") -> "AskedOfMembers":
-        """What several motions ask together."""
+    def of_all(cls, parts: "Sequence[PricingStates]") -> "PricingStates":
+        """Those of several motions together."""
         return cls(tuple(scene for part in parts for scene in part.scenes))
 
 
@@ -76,29 +76,31 @@ class _Rows(NamedTuple):
     share: FloatArray
 
 
-def asked_of(driver: "GeneralDriver", factor: FloatArray) -> AskedOfMembers:
-    """What the rows of a driver's last evaluation ask of members, each times its factor (n_resp, R)."""
+def pricing_states_of(driver: "GeneralDriver", factor: FloatArray) -> PricingStates:
+    """The states from which prices follow, of the rows of a driver's last evaluation times factor (n_resp, R)."""
     model, count = driver.model_of_run, driver.count
     index = driver.room_ints[: 4 * (int(driver.limits[1]) + 1)].reshape(-1, 4)
-    asked = _rows_of(driver, factor)
+    chosen = _rows_of(driver, factor)
     pairs = {int(block[PAIR]): None for block in model.block if driver.case.members[block[GROUP]].candidates}
     size = driver.scene.kinematics
-    states, each = int(index[count, FIRST]) + OF_A_ROW * len(asked.rows), size.freedoms
-    pose = np.zeros((states, len(pairs), size.pose_size))
-    change, pose_a = np.zeros((2, states, len(pairs), each))
-    energy, when, segment = np.zeros(states), np.zeros(states), np.full(states, -1)
-    scratch = np.zeros((max(len(asked.rows), 1), len(driver.padded)))
+    n_state, each = int(index[count, FIRST]) + OF_A_ROW * len(chosen.rows), size.freedoms
+    pose = np.zeros((n_state, len(pairs), size.pose_size))
+    change, pose_a = np.zeros((2, n_state, len(pairs), each))
+    energy, when, segment = np.zeros(n_state), np.zeros(n_state), np.full(n_state, -1)
+    scratch = np.zeros((max(len(chosen.rows), 1), len(driver.padded)))
     arguments: tuple[Any, ...] = (
-        *driver.steps_arguments(count)[:4], driver.limits, count, *asked, np.array(list(pairs), dtype=np.int64),
+        *driver.steps_arguments(count)[:4], driver.limits, count, *chosen, np.array(list(pairs), dtype=np.int64),
         driver.room, driver.room_ints, driver.member_state, scratch, pose, change, pose_a, energy, when, segment,
         driver.work,
     )  # fmt: skip
     ask_members(*arguments)
     numbers = {pair: number for number, pair in enumerate(pairs)}
-    own = AskedOfScene(driver.case, driver.scene, model, numbers, pose, change, pose_a, energy, when, segment, None)
+    own = ScenePricingStates(
+        driver.case, driver.scene, model, numbers, pose, change, pose_a, energy, when, segment, None
+    )  # fmt: skip
     if any(_switches(law) for group in driver.case.priced_groups for law in group.laws):
-        own = own._replace(steps=steps_of(driver, own, index, asked.rows))
-    return AskedOfMembers((own,))
+        own = own._replace(steps=steps_of(driver, own, index, chosen.rows))
+    return PricingStates((own,))
 
 
 def _switches(law: Law) -> bool:
@@ -128,7 +130,7 @@ def _rows_of(driver: "GeneralDriver", factor: FloatArray) -> _Rows:
     )
 
 
-class GeneralCandidates(CandidatePass[AskedOfMembers]):
+class GeneralCandidates(CandidatePass[PricingStates]):
     """The candidates of a group of any laws; place: its number in the case. The rest as of `CandidatePass`."""
 
     def __init__(
@@ -137,20 +139,20 @@ class GeneralCandidates(CandidatePass[AskedOfMembers]):
         # as `scene.origin.ends_of` has it
         super().__init__(group, homes, group.body_to == GROUND, count)
         self._place = place
-        self._last: tuple[AskedOfMembers, tuple[IndexArray, FloatArray]] | None = None
+        self._last: tuple[PricingStates, tuple[IndexArray, FloatArray]] | None = None
 
-    def tiles(self, asked: AskedOfMembers, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
+    def tiles(self, states: PricingStates, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
         """(T, TILE_NUMBERS): what `price_tiles` keeps of each tile."""
         out = np.empty((*self.shape, TILE_NUMBERS))
-        packed = self._packed(asked, self.chosen)
-        kernels.price_tiles(*self._room(asked), *packed, self.common(worth), *built, allowed(), out)
+        packed = self._packed(states, self.chosen)
+        kernels.price_tiles(*self._room(states), *packed, self.common(worth), *built, allowed(), out)
         return out.reshape(-1, TILE_NUMBERS)
 
-    def prices_between(self, asked: AskedOfMembers, a: IndexArray, b: IndexArray) -> FloatArray:
+    def prices_between(self, states: PricingStates, a: IndexArray, b: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from first points to second ones."""
-        if self._last is None or self._last[0] is not asked:
-            self._last = asked, self._packed(asked, (slice(None), slice(None)))
-        found, room = np.empty(len(a)), self._room(asked)
+        if self._last is None or self._last[0] is not states:
+            self._last = states, self._packed(states, (slice(None), slice(None)))
+        found, room = np.empty(len(a)), self._room(states)
         for start in range(0, len(a), PLACES):
             part = slice(start, start + PLACES)
             places = np.stack([a[part], b[part]]).astype(np.int64)
@@ -159,9 +161,9 @@ class GeneralCandidates(CandidatePass[AskedOfMembers]):
             found[part] = out
         return found
 
-    def _room(self, asked: AskedOfMembers) -> tuple[IndexArray, FloatArray]:
+    def _room(self, states: PricingStates) -> tuple[IndexArray, FloatArray]:
         """A packed scene with room for the members of a tile, and for the numbers of any of the scenes' laws."""
-        scene, model = asked.scenes[0].scene, asked.scenes[0].model
+        scene, model = states.scenes[0].scene, states.scenes[0].model
         segments = len(model.active)
         room = model._replace(
             block=np.zeros((1, ROW + 1), dtype=np.int64),
@@ -170,20 +172,20 @@ class GeneralCandidates(CandidatePass[AskedOfMembers]):
             level=np.zeros((segments, 1, 2)),
             power=np.ones(1),
             member=np.zeros((len(model.member), PLACES)),
-            curves=np.zeros(_most_curves(asked)),
+            curves=np.zeros(_most_curves(states)),
         )
         return pack_general(room, scene.kinematics)
 
     def _packed(
-        self, asked: AskedOfMembers, chosen: tuple[IndexArray | slice, IndexArray | slice]
+        self, states: PricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]
     ) -> tuple[IndexArray, FloatArray]:
-        """A packed `candidate_prices.Asked`; chosen: which points of both grids."""
-        curves = np.zeros((len(asked.scenes), _most_curves(asked)))
+        """A packed `candidate_prices.PricedCandidates`; chosen: which points of both grids."""
+        curves = np.zeros((len(states.scenes), _most_curves(states)))
         points: list[list[FloatArray]] = []
         runs: list[_Run] = []
         rows: list[list[int]] = []
         state = step = node = 0
-        for number, scene in enumerate(asked.scenes):
+        for number, scene in enumerate(states.scenes):
             curves[number, : len(scene.model.curves)] = scene.model.curves
             points.append(self._points(scene, chosen))
             for run in self._runs(scene):
@@ -203,9 +205,11 @@ class GeneralCandidates(CandidatePass[AskedOfMembers]):
             *(np.array(each) for each in zip(*points, strict=True)),
             *(each[k].T for each, k in zip(self.homes, chosen, strict=True)),
         )
-        return FIELDS.packed(kernels.Asked(*arrays))
+        return FIELDS.packed(kernels.PricedCandidates(*arrays))
 
-    def _points(self, scene: AskedOfScene, chosen: tuple[IndexArray | slice, IndexArray | slice]) -> list[FloatArray]:
+    def _points(
+        self, scene: ScenePricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]
+    ) -> list[FloatArray]:
         """Points of both grids (d, n) as a scene has them: in body frames, at the start, where its case has them."""
         case, load_case = scene.case, scene.scene.load_case
         group, dimension = case.members[self._place], dimension_of(case)
@@ -225,15 +229,15 @@ class GeneralCandidates(CandidatePass[AskedOfMembers]):
         pairs = (local, home, stated)
         return [each[side][chosen[side]].T for each in pairs for side in range(2)]
 
-    def _runs(self, scene: AskedOfScene) -> "list[_Run]":
-        """What each law of the group is asked for in a scene."""
+    def _runs(self, scene: ScenePricingStates) -> "list[_Run]":
+        """The states of each law of the group in a scene."""
         model, group = scene.model, as_computed(scene.case).members[self._place]
         blocks = np.flatnonzero(model.block[:, GROUP] == self._place)
         return [_run_of(scene, k, record) for k, record in zip(blocks.tolist(), group.laws, strict=True)]
 
 
 class _Run(NamedTuple):
-    """A row of `candidate_prices.Asked.run` with its states, steps and nodes; each as there.
+    """A row of `candidate_prices.PricedCandidates.run` with its states, steps and nodes; each as there.
 
     row: the law's code, how many states there are before the first one whose energy counts, and whether it acts from
     the start.
@@ -257,8 +261,8 @@ class _Run(NamedTuple):
     node_energy: FloatArray
 
 
-def _run_of(scene: AskedOfScene, k: int, record: Law) -> _Run:
-    """What the law of block k is asked for in a scene."""
+def _run_of(scene: ScenePricingStates, k: int, record: Law) -> _Run:
+    """The states of the law of block k in a scene."""
     model, pair = scene.model, scene.pairs[int(scene.model.block[k, PAIR])]
     free, code = getattr(record, "free_length", None), int(model.block[k, CODE])
     moves, stores = scene.change[:, pair].any(axis=1), scene.energy != 0.0
@@ -294,7 +298,7 @@ def _level(model: GeneralModel, k: int, segment: IndexArray, when: FloatArray) -
 class Steps(NamedTuple):
     """The steps of a motion, in the order in which members that switch go through them, each with its nodes.
 
-    step (K, 5), step_time (K, 2): as of `candidate_prices.Asked`. segment (K,): in which each is.
+    step (K, 5), step_time (K, 2): as of `candidate_prices.PricedCandidates`. segment (K,): in which each is.
     pose (nodes, G, POSE), pose_a, change (nodes, G, D), energy (nodes,): at the nodes.
     """
 
@@ -307,10 +311,10 @@ class Steps(NamedTuple):
     energy: FloatArray
 
 
-def steps_of(driver: "GeneralDriver", asked: AskedOfScene, index: IndexArray, rows: FloatArray) -> Steps:
+def steps_of(driver: "GeneralDriver", states: ScenePricingStates, index: IndexArray, rows: FloatArray) -> Steps:
     """The steps of a driver's last run, with partial ones and states of rows between them.
 
-    driver: with the run. asked: its states. index: of its history. rows (R, COLUMNS): whose states these are.
+    driver: with the run. states: those of its rows. index: of its history. rows (R, COLUMNS): whose states these are.
     """
     count, t = driver.count, driver.states()[0]
     found: list[tuple[tuple[float, int, int, int], list[int], tuple[float, float], tuple[int, float]]] = []
@@ -319,7 +323,7 @@ def steps_of(driver: "GeneralDriver", asked: AskedOfScene, index: IndexArray, ro
         found.append(((t[w], 3, 0, 0), [*stages, kernels.WHOLE], (t[w], t[w + 1] - t[w]), (w, 1.0)))
     for m, row in enumerate(rows):
         k, c, at = int(row[STEP]), float(row[FRACTION]), int(index[count, FIRST]) + OF_A_ROW * m
-        used = int((asked.segment[at + 1 : at + OF_A_ROW] >= 0).sum())
+        used = int((states.segment[at + 1 : at + OF_A_ROW] >= 0).sum())
         begin, length = t[k], t[k + 1] - t[k]
         inside = 0.0 < c < 1.0
         if used:
@@ -328,7 +332,7 @@ def steps_of(driver: "GeneralDriver", asked: AskedOfScene, index: IndexArray, ro
         key = (begin, 1, m, 1) if used else (begin, 4, m, 0) if inside else (begin + max(c, 0.0) * length, 0, m, 0)
         found.append((key, [at, at + 1, kernels.POINT], (begin + c * length, 0.0), (k, c)))
     found.sort(key=lambda each: each[0])
-    moves = asked.change.any(axis=(1, 2)) | (asked.energy != 0.0)
+    moves = states.change.any(axis=(1, 2)) | (states.energy != 0.0)
     step = [
         [*where[:2], NODES * number, where[2], int(moves[where[0] : where[1]].any())]
         for number, (_, where, _, _) in enumerate(found)
@@ -336,15 +340,15 @@ def steps_of(driver: "GeneralDriver", asked: AskedOfScene, index: IndexArray, ro
     times = np.array([each[2] for each in found])
     places = np.array([[k, min(c, 1.0) * node] for _, _, _, (k, c) in found for node in NODE])
     (q, out), _, _ = driver.sample_response(-1, places, False, count)
-    pose, pose_a = np.zeros((len(places), *asked.pose.shape[1:])), np.zeros((len(places), *asked.pose_a.shape[1:]))
-    pairs = np.array(list(asked.pairs), dtype=np.int64)
+    pose, pose_a = np.zeros((len(places), *states.pose.shape[1:])), np.zeros((len(places), *states.pose_a.shape[1:]))
+    pairs = np.array(list(states.pairs), dtype=np.int64)
     keep_states(driver.ints, driver.floats, q, out[0], out[1], pairs, pose, pose_a)
     change, energy = (
-        [_between_stages(values, asked.when, slice(*where[:2]), *time) for (_, where, time, _) in found]
-        for values in (asked.change, asked.energy)
+        [_between_stages(values, states.when, slice(*where[:2]), *time) for (_, where, time, _) in found]
+        for values in (states.change, states.energy)
     )
     return Steps(
-        np.array(step, dtype=np.int64).reshape(-1, 5), times, asked.segment[[each[0] for each in step]], pose, pose_a,
+        np.array(step, dtype=np.int64).reshape(-1, 5), times, states.segment[[each[0] for each in step]], pose, pose_a,
         np.concatenate(change), np.concatenate(energy),
     )  # fmt: skip
 
@@ -386,6 +390,6 @@ def _no_steps(pose: int, freedoms: int) -> tuple[Any, ...]:
     return np.zeros((0, 5), dtype=np.int64), np.zeros((0, 2)), *nodes
 
 
-def _most_curves(asked: AskedOfMembers) -> int:
+def _most_curves(states: PricingStates) -> int:
     """The most numbers that the laws of a scene have."""
-    return max(len(scene.model.curves) for scene in asked.scenes)
+    return max(len(scene.model.curves) for scene in states.scenes)

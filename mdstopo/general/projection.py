@@ -133,7 +133,7 @@ def project(model, scale, q, v, workspace, mu, nu):
     solve_unknowns(model, workspace, shift, nu)
     for d in range(n):
         v[d] += shift[d]
-    return model.place.shape[0] + which[0] if worst > MISFIT * scale else -1
+    return model.unknown_index.shape[0] + which[0] if worst > MISFIT * scale else -1
 
 
 @kernel

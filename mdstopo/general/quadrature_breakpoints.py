@@ -22,12 +22,11 @@ from mdstopo.general.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.sensitivity.reductions import INTEGRALS
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
 
-#: reductions that are integrals over time: of g (1), of its square (2)
-INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
 #: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than a method's own weights; than collocation's, too
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 FINE_NODES, FINE_WEIGHTS = np.polynomial.legendre.leggauss(20)

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, parts
-from mdstopo.general.quadrature_breakpoints import INTEGRALS
 from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.sensitivity.reductions import INTEGRALS
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

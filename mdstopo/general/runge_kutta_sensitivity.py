@@ -19,26 +19,9 @@ from mdstopo.mechanics.kinematics.kinematics_interface import advance_coordinate
 
 @kernel
 def point_of(tag, model, tables, member_state, history, count, k, c, keep, workspace, q, v, work):
-    """The state inside a step: the end of a step of length c h from the same start.
+    """The end of a step of length c h from the same start; see `method_interface.point_of`.
 
-    Constant:
-      tag: the method of integration (`method_interface`).
-      model: the compiled scene.
-      tables: coefficients of the method.
-    In:
-      count: number of steps.
-      k, c: number of the step, and the fraction of it.
-      keep: whether the partial step is kept, as number count + 1, for a reverse sweep.
-    In place:
-      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-        The modes become those of step k.
-      history: the history of steps (`StepHistory`).
-    Out:
-      workspace: workspace of a balance (`accelerations.Workspace`).
-      q (n_q,), v (n,): the state.
-      work (WORK,): counts of work, added to.
-
-    Returns the number of the step that ends there: count + 1 where it is kept; else k.
+    With `keep` this partial step is number count + 1, which is returned.
     """
     n = v.shape[0]
     n_q = q.shape[0]
@@ -69,49 +52,18 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
 
 @kernel
 def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, workspace, work):
-    """Pull R cotangents of the end of a step back to its start.
+    """Stage after stage, the last one first; see `method_interface.step_back`.
 
-    Constant:
-      tag: the method of integration (`method_interface`).
-      model: the compiled scene.
-      tables: coefficients of the method.
-      history: the history of steps (`StepHistory`).
-    In:
-      w: number of the step.
-      c: not used: a point inside a step is the end of a partial one (`point_of`).
-      bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers; no rows: none.
-    In place:
-      lam_q, lam_v (R, n): the cotangents of coordinates and velocities.
-      lam_x: not used: nothing else is carried from step to step.
-    Out:
-      z (R, s or more, n): virtual displacements of the stages' balances.
-      y (n_row,): scratch.
-      workspace: workspace of a balance (`accelerations.Workspace`).
-      work (WORK,): counts of work, added to.
+    Not used: c (a point inside a step is the end of a partial one), lam_x (nothing else is carried from step to step).
     """
     steps_back(tag, model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y, workspace, work)
 
 
 @kernel
 def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
-    """Push changes of the state at the start of a step to its end.
+    """Stage after stage; see `method_interface.step_forward`. Returns True.
 
-    Constant:
-      tag: the method of integration (`method_interface`).
-      model: the compiled scene.
-      tables: coefficients of the method.
-      history: the history of steps (`StepHistory`).
-    In:
-      w: number of the step.
-      c, sweeps, dx: not used: partial steps are steps of their own, no stage is implicit, nothing else is carried.
-      force (s, n): changes of the forces at the stages (N, N m).
-    In place:
-      dq, dv (n,): changes of coordinates and velocities.
-    Out:
-      changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
-      workspace: workspace of a balance (`accelerations.Workspace`).
-
-    Returns True: there are no sweeps that might not settle.
+    Not used: c, sweeps, dx: partial steps are steps of their own, no stage is implicit, nothing else is carried.
     """
     changes_forward(tag, model, tables, history, w, dq, dv, force, changes, rows, workspace)
     return True
@@ -119,14 +71,7 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
 
 @kernel
 def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
-    """The motion a little later, on a parabola: it has the accelerations of its balance everywhere.
-
-    model: the compiled scene.
-    tag, history, k, c: method, history, step and fraction; not used.
-    e: how much later (s); below 0: earlier.
-    q (n_q,), v, a (n,): the motion here.
-    q_out (n_q,), v_out (n,): coordinates and velocities there.
-    """
+    """On a parabola with the accelerations at c; see `method_interface.beside`. Not used: history, k, c."""
     advance_coordinates(model, q, v, a, e, q_out)
     for d in range(v.shape[0]):
         v_out[d] = v[d] + e * a[d]
@@ -146,15 +91,7 @@ def is_continuous(tag):
 
 @kernel
 def weights_of(tag, model, tables, history, w, out):
-    """Weights of the stages in an integral over one step, as of the velocity of one more coordinate.
-
-    tag: the method of integration (`method_interface`).
-    model: the compiled scene.
-    tables: coefficients of the method.
-    history: the history of steps (`StepHistory`).
-    w: number of the step.
-    out (s or more,): the weights (s).
-    """
+    """As of the velocity of one more coordinate; see `method_interface.weights_of`."""
     table, stages = table_of_step(tag, model, tables, history, w)
     for j in range(stages):
         out[j] = (history.t[w + 1] - history.t[w]) * table[2, 2, j]

@@ -12,12 +12,12 @@ K dq + Phi_q^T dlam = dF, Phi_q dq = 0: `inverse` is that linear map.
 Every search begins at the stated configuration, whatever was found before.
 """
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mdstopo.scene.model import FloatArray
+from mdstopo.scene.settled import Settled
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
@@ -36,29 +36,6 @@ BACK, TRIALS = 0.1, 30
 NEAR, ARRIVED = 1e-6, 1e-13
 #: stiffness, relative to the largest, below which a direction counts as free
 FREE = 1e-9
-
-
-@dataclass(frozen=True)
-class Settled:
-    """An equilibrium.
-
-    q (n_q,): what the bodies have moved since home.
-    inverse (n, n): dq = inverse dF. moved: how far the centre of a body has gone at most, m, and whose it is;
-    turned: the same of angles, rad.
-    """
-
-    q: FloatArray
-    inverse: FloatArray
-    moved: float
-    moved_body: str
-    turned: float
-    turned_body: str
-
-    def __str__(self) -> str:
-        return (
-            f"the start has settled by {self.moved:.4g} m at most (body {self.moved_body}), "
-            f"turned by {self.turned:.4g} rad (body {self.turned_body})"
-        )
 
 
 def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:

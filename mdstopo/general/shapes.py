@@ -2,8 +2,8 @@
 
 from mdstopo.evaluation import Shape
 from mdstopo.general.model import GeneralModel
-from mdstopo.general.quadrature_breakpoints import INTEGRALS
 from mdstopo.general.responses import has_norm, is_absolute
+from mdstopo.sensitivity.reductions import INTEGRALS
 
 
 def shape_of(model: GeneralModel, j: int, reduction: str) -> Shape:

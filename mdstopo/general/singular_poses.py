@@ -42,10 +42,10 @@ def least_singular_value(model, workspace):
 
     1 where it is not known: where the factors there are not those of the joints' matrix, or there are no joints.
     """
-    if workspace.switches[OF_JOINTS] == 0 or model.envelope.shape[0] == 0:
+    if workspace.switches[OF_JOINTS] == 0 or model.skyline.shape[0] == 0:
         return 1.0
-    size, _ = growth(model.envelope, workspace.gram, workspace.diagonal, workspace.x)
-    return np.sqrt(model.envelope.shape[0] / size) if size > 0.0 else 1.0
+    size, _ = growth(model.skyline, workspace.gram, workspace.diagonal, workspace.x)
+    return np.sqrt(model.skyline.shape[0] / size) if size > 0.0 else 1.0
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Where the motion of a general scene starts: as stated, or at rest where the case asks for `settle`.
 
 A start at rest depends on the design: on alpha, and on the values p of laws' variables. With A = K^-1, joints included
-(`settle.Settled.inverse`), and the forces' own derivatives at rest, as they are in every balance (`parameters`),
+(`scene.settled.Settled.inverse`), and the forces' own derivatives at rest, as they are in every balance (`parameters`),
 
     dq0/d(alpha_i^mu) = -A B_i^T f_i,     dq0/dp = -A sum s B^T f_p.
 
@@ -23,10 +23,10 @@ from mdstopo.mechanics.joints.table import describe
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.bodies import distances
 from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.settled import Settled
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
-    from mdstopo.general.settle import Settled
 
 #: misfit of a joint at the start, relative to the scene's size or speeds, up to which it fits
 FITS = 1e-8

@@ -244,20 +244,6 @@ def events_included(member_state):
 
 
 @kernel
-def step_at(history, count, t):
-    """The step that holds time t: the last one that begins before it."""
-    low = 0
-    high = count - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if history.t[middle] < t:
-            low = middle
-        else:
-            high = middle - 1
-    return low
-
-
-@kernel
 def copy_vector(source, target):
     """target = source, one-dimensional."""
     for i in range(source.shape[0]):

@@ -1,7 +1,6 @@
 """Which integrator a case gets, and why: the rule of `auto`, and the methods that the records name."""
 
 import importlib
-from types import ModuleType
 
 import numpy as np
 
@@ -42,37 +41,21 @@ def has_coarse_steps(solver: SolverSettings) -> bool:
 def gauss(_: SolverSettings) -> Method:
     from mdstopo.integrators.gauss_tables import gauss_tables
 
-    def load() -> ModuleType:
-        from mdstopo.integrators import gauss_entry
-
-        return gauss_entry
-
-    return Method(INTEGRATORS["gauss"], load, gauss_tables(), steps=32, stages=256, collocates=True)
+    return Method(INTEGRATORS["gauss"], gauss_tables(), steps=32, stages=256, collocates=True)
 
 
 def generalized_alpha(solver: SolverSettings) -> Method:
-    def load() -> ModuleType:
-        from mdstopo.integrators import generalized_alpha_entry
-
-        return generalized_alpha_entry
-
     radius = 0.8 if solver.spectral_radius is None else solver.spectral_radius
-    return Method(INTEGRATORS["generalized_alpha"], load, np.array([radius]), steps=1024, stages=1100)
+    return Method(INTEGRATORS["generalized_alpha"], np.array([radius]), steps=1024, stages=1100)
 
 
 def runge_kutta(_: SolverSettings) -> Method:
     from mdstopo.integrators.runge_kutta_tables import runge_kutta_tables
 
-    def load() -> ModuleType:
-        from mdstopo.integrators import runge_kutta_entry
-
-        return runge_kutta_entry
-
-    return Method(INTEGRATORS["runge_kutta"], load, runge_kutta_tables(), steps=64, stages=1200)
+    return Method(INTEGRATORS["runge_kutta"], runge_kutta_tables(), steps=64, stages=1200)
 
 
 def esdirk(_: SolverSettings) -> Method:
     from mdstopo.integrators.esdirk_tables import STAGES, esdirk_tables
 
-    kind = INTEGRATORS["esdirk"]
-    return Method(kind, lambda: importlib.import_module(kind.general), esdirk_tables(), steps=64, stages=64 * STAGES)
+    return Method(INTEGRATORS["esdirk"], esdirk_tables(), steps=64, stages=64 * STAGES)

@@ -5,12 +5,13 @@ little, and gives the steps more room when the kernel asks for it.
 """
 
 from collections.abc import Callable
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from mdstopo.case.memory import holds_steps
+from mdstopo.case.memory import room_factor
 from mdstopo.compiler.fields import aligned
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, quadrature_breakpoints
@@ -81,7 +82,7 @@ class Driver:
     def entry(self) -> Any:
         """The method's compiled entries, imported when first used."""
         if self._entry is None:
-            self._entry = self.method.load()
+            self._entry = import_module(self.method.kind.springs)
             if self._beside is not None and self._beside.due:
                 self._entry.simulate.compile(*self._simulate_arguments(False))
         return self._entry
@@ -196,9 +197,10 @@ class Driver:
             code, count, time = self._simulate[tangent]()
             if code != NEEDS_ROOM:
                 return code, count, time
-            if not holds_steps(2 * len(self.room)):
+            factor = room_factor(len(self.room))
+            if factor == 1.0:
                 return STEP_LIMIT, count if time > self.scene.model.times[0] else 0, time
-            self._make_room(2 * int(self.limits[1]), 2 * int(self.limits[2]))
+            self._make_room(*(int(factor * int(size)) for size in self.limits[1:3]))
 
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the strengths of the last run."""

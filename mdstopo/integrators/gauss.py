@@ -18,7 +18,7 @@ from collections import namedtuple
 import numpy as np
 
 from mdstopo.compiler.jit import entry, part
-from mdstopo.integrators.gauss_equations import ABOUT, Room, balance, dense_rows, fastest_rate
+from mdstopo.integrators.gauss_equations import ABOUT, Room, dense_rows, fastest_rate, solve_nodes
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.rows import (
     copy_row,
@@ -322,7 +322,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                         lost = noise_of(pair, noise, rel[0], reach, q[s - 1], p)
                         scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
                     motion_weights(pair, rel[0], reach, scale, weight)
-                e = balance(
+                e = solve_nodes(
                     pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning,
                     newton == 0, weight, accuracy, ref, a, q, v, work,
                 )  # fmt: skip

@@ -41,7 +41,7 @@ DENSE = 24
 
 
 @part
-def balance(
+def solve_nodes(
     pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, alike, weight, accuracy, ref, a,
     q, v, work,
 ):  # fmt: skip

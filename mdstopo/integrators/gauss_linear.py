@@ -52,19 +52,7 @@ def _polynomials(c, s, first, second):
 
 @kernel
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The collocation polynomial at a fraction of window k.
-
-    In:
-      steps: what the integrator kept.
-      k: number of the step.
-      c: fraction of it, 0 to 1.
-    Out:
-      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
-
-    Not used: model, tables, strength, count, damped, work.
-
-    Returns k and c: a reverse sweep starts there.
-    """
+    """The collocation polynomial of window k; see `steps_interface.point_of`. Returns k and c."""
     o = steps.index[k, FIRST]
     s = steps.index[k + 1, FIRST] - o
     h = steps.t[k + 1] - steps.t[k]
@@ -123,28 +111,7 @@ def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
-    """Carry derivatives of a response back through window w, by sweeps of the transposed balance (duty 5).
-
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables (n_level, 7, s_max, s_max): of `gauss_tables`.
-      steps: what the integrator kept.
-      w: number of the step.
-      c_point: fraction of the step at which the response is evaluated; negative: none.
-      mu_q, mu_v (n,): derivatives of the response by q and v there; zero where c_point < 0.
-      stage_q_bar (s, n): explicit derivatives by the coordinates of the stages; no rows: none.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-      accuracy: relative, to which an iteration has to go; 0: to rounding.
-    In and out:
-      lam_q, lam_v (n,): derivatives by q and v at the end of the step; become those at its start.
-    Out:
-      z (s, n): virtual displacement of each stage's force balance.
-      work (WORK,): counts of work, added to.
-
-    Not used: lam_x.
-    """
+    """By sweeps of the window's transposed equations; see `steps_interface.reverse_step`. Not used: lam_x."""
     level = steps.index[w, LEVEL]
     s = COUNTS[level]
     n = lam_q.shape[0]
@@ -223,25 +190,7 @@ def reverse_step(
 
 @kernel
 def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Carry changes of the state forward through window w, by sweeps of the linear balance (duty 6).
-
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables (n_level, 7, s_max, s_max): of `gauss_tables`.
-      steps: what the integrator kept.
-      w: number of the step.
-      c_point: fraction of the step up to which; negative: to its end.
-      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-    In and out:
-      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
-    Out:
-      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
-
-    Not used: dx.
-    """
+    """By sweeps of the window's linear equations; see `steps_interface.tangent_step`. Not used: dx."""
     level = steps.index[w, LEVEL]
     s = COUNTS[level]
     n = dq.shape[0]

@@ -7,7 +7,7 @@ stages); room, room_ints for the steps; strength (3 or more, M_padded), see `act
 
 import numpy as np
 
-import mdstopo.integrators.generalized_alpha_linear  # noqa: F401  (enters the contract's table)
+import mdstopo.integrators.generalized_alpha_linear  # noqa: F401  (enters the interface's table)
 from mdstopo.compiler.jit import entry
 from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, integrate, longest_step
 from mdstopo.integrators.generalized_alpha import rate_at_start as _rate_at_start

@@ -41,38 +41,14 @@ def cubic(start, end, h, c, q, v):
 
 @kernel
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The cubic between the ends of step k, and its derivative.
-
-    In:
-      steps: what the integrator kept.
-      k: number of the step.
-      c: fraction of it, 0 to 1.
-    Out:
-      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
-
-    Not used: model, tables, strength, count, damped, work.
-
-    Returns k and c: a reverse sweep starts there.
-    """
+    """The cubic between the ends of step k, and its derivative; see `steps_interface.point_of`. Returns k and c."""
     cubic(steps.state[k], steps.state[k + 1], steps.t[k + 1] - steps.t[k], c, q, v)
     return k, c
 
 
 @kernel
 def sample(steps, count, damped, t, g, d):
-    """Every end of a step as a sample: what else is a stage is there already, or off the motion.
-
-    In:
-      steps: what the integrator kept.
-      count: steps that were taken.
-      damped: whether any force depends on velocity.
-    Out:
-      t (S or more,): times (s), rising; S is the number of stages.
-      g (S or more,): energies then (J).
-      d (S or more,): their rates (W).
-
-    Returns how many samples there are.
-    """
+    """Every end of a step: what else is a stage is there already, or off the motion; see `steps_interface.sample`."""
     for k in range(count - 1):
         o = steps.index[k + 1, FIRST] - 1
         t[k] = steps.scalar[o, TIME]
@@ -112,27 +88,9 @@ def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
-    """Carry derivatives of a response back through step w (duty 5).
+    """By the transposed Newton matrix of the step's end; see `steps_interface.reverse_step`.
 
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables (1,): the spectral radius.
-      steps: what the integrator kept.
-      w: number of the step.
-      c_point: fraction of the step at which the response is evaluated; negative: none.
-      mu_q, mu_v (n,): derivatives of the response by q and v there; zero where c_point < 0.
-      stage_q_bar (s, n): explicit derivatives by the coordinates of the stages; no rows: none.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-    In and out:
-      lam_q, lam_v (n,): derivatives by q and v at the end of the step; become those at its start.
-      lam_x (2, n): the same by the accelerations and the auxiliary ones.
-    Out:
-      z (s, n): virtual displacement of each stage's force balance.
-      work (WORK,): counts of work, added to.
-
-    Not used: accuracy.
+    lam_x (2, n) belongs to the accelerations and the auxiliary ones. Not used: accuracy.
     """
     n = lam_q.shape[0]
     o = steps.index[w, FIRST]
@@ -214,23 +172,9 @@ def reverse_step(
 
 @kernel
 def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Carry changes of the state forward through step w (duty 6).
+    """By the Newton matrix of the step's end; see `steps_interface.tangent_step`.
 
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables (1,): the spectral radius.
-      steps: what the integrator kept.
-      w: number of the step.
-      c_point: fraction of the step up to which; negative: to its end.
-      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-    In and out:
-      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
-      dx (2, n): the same of the accelerations and the auxiliary ones, always to the end.
-    Out:
-      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
+    dx (2, n) belongs to the accelerations and the auxiliary ones, and always goes to the end.
     """
     n = dq.shape[0]
     o = steps.index[w, FIRST]

@@ -8,7 +8,7 @@ a given order leaves. Steps that leave too much are halved, and the motion is co
 nothing was wrong, it is not taken.
 """
 
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from mdstopo.integrators.gauss_tables import LEGENDRE, LEVELS, gauss_tables
 from mdstopo.integrators.runge_kutta_tables import GENERAL, NYSTROEM, ORDERS, VECTORS, B, C, runge_kutta_tables
 from mdstopo.integrators.steps import ENERGY, FIRST, carve
 from mdstopo.scene.model import FloatArray, IndexArray, Model
+from mdstopo.scene.signals import cut_linear, parents_of
 
 if TYPE_CHECKING:
     from mdstopo.integrators.driver import Driver
@@ -34,12 +35,9 @@ SHARE = 10.0
 def landed(model: Model, times: list[float]) -> Model:
     """The model with further ends of segments; what acts in time is the same function as before."""
     whole = np.unique(np.append(model.times, times))
-    parent = np.clip(np.searchsorted(model.times, whole[:-1], side="right") - 1, 0, len(model.times) - 2)
-    tau = whole[:-1] - model.times[parent]
-    force, turning = model.force[parent].copy(), model.load_force[parent].copy()
-    force[..., 0] += tau[:, None] * force[..., 1]
-    turning[..., 0] += tau[:, None, None] * turning[..., 1]
-    return model._replace(times=whole, force=force, load_force=turning)
+    parent, tau = parents_of(model.times, whole)
+    cut = partial(cut_linear, parent=parent, tau=tau)
+    return model._replace(times=whole, force=cut(model.force), load_force=cut(model.load_force))
 
 
 def quadrature_breakpoints(driver: "Driver", count: int) -> tuple[list[float], float, float]:

@@ -64,45 +64,14 @@ def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, wo
 
 @kernel
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The state after a partial step, which is not kept.
-
-    Constant:
-      model: the compiled scene.
-      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
-      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
-    In:
-      steps: what the integrator kept.
-      count: steps that were taken.
-      k: number of the step.
-      c: fraction of it, 0 to 1.
-      damped: whether any force depends on velocity.
-    Out:
-      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
-      work (WORK,): counts of work, added to.
-
-    Returns k and c.
-    """
+    """The state after a partial step, which is not kept; see `steps_interface.point_of`. Returns k and c."""
     _partial(model, tables, strength, steps, count, k, c, damped, np.bool_(False), q, v, work)
     return k, c
 
 
 @kernel
 def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The state after a partial step, which is kept as step count + 1.
-
-    Constant:
-      model: the compiled scene.
-      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
-      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
-    In:
-      steps: what the integrator kept.
-      count: steps that were taken.
-      k: number of the step.
-      c: fraction of it, 0 to 1.
-      damped: whether any force depends on velocity.
-    Out:
-      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
-      work (WORK,): counts of work, added to.
+    """The state after a partial step, which is kept as step count + 1; see `steps_interface.reach`.
 
     Returns count + 1 and -1: a reverse sweep starts at the end of the partial step.
     """
@@ -112,19 +81,7 @@ def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
 
 @kernel
 def sample(steps, count, damped, t, g, d):
-    """Starts of steps with their rates; inside, stage values without (a Nystroem stage has no velocity).
-
-    In:
-      steps: what the integrator kept.
-      count: steps that were taken.
-      damped: whether any force depends on velocity.
-    Out:
-      t (S or more,): times (s), rising; S is the number of stages.
-      g (S or more,): energies then (J).
-      d (S or more,): their rates (W); NaN where unknown.
-
-    Returns how many samples there are.
-    """
+    """Starts of steps with rates, other stages without: they have no velocity; see `steps_interface.sample`."""
     s = STAGES[1 if damped else 0]
     m = 0
     for w in range(count):
@@ -180,24 +137,9 @@ def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
-    """Carry derivatives of a response back through step w (duty 5); a point inside a step is a partial step's end.
+    """Stage after stage, the last one first; see `steps_interface.reverse_step`.
 
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
-      steps: what the integrator kept.
-      w: number of the step.
-      stage_q_bar (s, n): explicit derivatives by the coordinates of the stages; no rows: none.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-    In and out:
-      lam_q, lam_v (n,): derivatives by q and v at the end of the step; become those at its start.
-    Out:
-      z (s, n): virtual displacement of each stage's force balance.
-      work (WORK,): counts of work, added to.
-
-    Not used: c_point, mu_q, mu_v, lam_x, accuracy.
+    Not used: c_point, mu_q, mu_v (a point inside a step is a partial step's end), lam_x, accuracy.
     """
     n = lam_q.shape[0]
     o = steps.index[w, FIRST]
@@ -236,23 +178,9 @@ def reverse_step(
 
 @kernel
 def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Carry changes of the state forward through step w (duty 6); a point inside a step is a partial step's end.
+    """Stage after stage; see `steps_interface.tangent_step`.
 
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
-      steps: what the integrator kept.
-      w: number of the step.
-      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-    In and out:
-      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
-    Out:
-      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
-
-    Not used: c_point, dx.
+    Not used: c_point (a point inside a step is a partial step's end), dx.
     """
     n = dq.shape[0]
     o = steps.index[w, FIRST]

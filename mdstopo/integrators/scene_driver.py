@@ -1,37 +1,30 @@
 """What the engine knows of whatever computes a scene: one interface, whichever kernels the scene needs.
 
-A `SceneFamily` compiles the load cases of a case into scenes, and makes of each a `SceneDriver`, which simulates and
-differentiates it. There are two families: springs between free bodies (`sensitivity.springs_driver`), and everything
-else (`general.general_driver`). `scene.family` tells which one a case needs; nothing else asks for it.
+A `SceneDriver` simulates and differentiates one load case. `SceneFamily` (`sensitivity.scene_family`) makes it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from mdstopo.case.integrators import IntegratorKind
-from mdstopo.case.model import Case, LoadCase, MemberGroup, Objective, ResponseRow
+from mdstopo.case.model import LoadCase, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.modes import Modes
+from mdstopo.scene.settled import Settled
 from mdstopo.status import Status
-
-if TYPE_CHECKING:
-    from mdstopo.general.settle import Settled
-    from mdstopo.sensitivity.candidate_pass import CandidatePass
 
 
 @dataclass(frozen=True)
 class Method:
     """An integrator as the engine sees it.
 
-    kind: its record. load: imports its compiled entries (simulate). tables: its constant arrays. steps, stages: room to
-    begin with. collocates: whether its stages are the nodes of Gauss's rules.
+    kind: its record. tables: its constant arrays. steps, stages: room to begin with. collocates: whether its stages are
+    the nodes of Gauss's rules.
     """
 
     kind: IntegratorKind
-    load: Callable[[], ModuleType]
     tables: FloatArray
     steps: int
     stages: int
@@ -193,11 +186,12 @@ class SceneDriver(Protocol):
     def start_modes(self, alpha: FloatArray) -> Modes:
         """Small motion about the start."""
 
-    def asked_of_members(self, factor: FloatArray) -> Any:
-        """What rows of the last evaluation, each times its factor (n_obj, R), ask of any member, built or not; with
-        gradients. Its `of_all` puts those of several scenes together; `SceneFamily.candidates` takes it."""
+    def pricing_states(self, factor: FloatArray) -> Any:
+        """The states from which prices of members follow, built or not, of the rows of the last evaluation, each times
+        its factor (n_obj, R); with gradients. Their `of_all` puts those of several scenes together;
+        `CandidatePass` takes them."""
 
-    def settled(self, alpha: FloatArray) -> "Settled | None":
+    def settled(self, alpha: FloatArray) -> Settled | None:
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
 
 
@@ -217,18 +211,3 @@ class DriverOptions:
     looked: Sequence[Objective | ResponseRow]
     design: FloatArray
     beside: Compiling | None = None
-
-
-class SceneFamily(NamedTuple):
-    """What one family of kernels computes.
-
-    scenes: the load cases of a case as scenes, by name. driver: the driver of one of them. candidates: those of a
-    priced group, from the scenes, the group's number and the group as the scenes have it, where its points P and Q are
-    at the start, (n, d) each, and about how many are meant (None: all).
-    """
-
-    scenes: Callable[[Case], Mapping[str, Scene]]
-    driver: Callable[[Case, Any, DriverOptions], SceneDriver]
-    candidates: Callable[
-        [Mapping[str, Any], int, MemberGroup, tuple[FloatArray, FloatArray], int | None], "CandidatePass[Any]"
-    ]

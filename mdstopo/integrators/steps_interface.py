@@ -2,28 +2,21 @@
 
 An integrator is a NamedTuple of steps and these compiled functions; `implement` enters them in the table below.
 
-1. `simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work) ->
-   (code, count, time reached)`, the entry that fills the steps (see `driver`). It lands on every entry of
-   `model.times`, solves the equations of each fixed step to rounding (of an adaptive one to the tolerance), and keeps
-   at each stage what the force balance saw (see `steps`).
-2. `point_of(model, tables, strength, steps, count, k, c, damped, q, v, work) -> (w, c_w)`: the state at fraction c of
-   step k, to the order of the method, and where the reverse sweep has to start for it: step w at its fraction c_w (-1:
-   at its end). `reach`, with the same arguments, also leaves what the reverse sweep needs: a method whose
-   interpolation is a partial step keeps that step behind the others. May be left out where `point_of` does it all.
-3. `parent_of(steps, w)`: the step before step w, -1 where w begins at the start.
-4. `stage_weights(tables, steps, w, out)`: weights (s,) of the stages in the integral over step w.
-5. `reverse_step(pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped,
-   turning, accuracy, work)`: carries derivatives of a response back through step w, from its end (lam) and from its
-   point (mu, zero where c_point < 0), explicit ones by the stages' coordinates added (no rows: none); leaves z (s, n),
-   the virtual displacement of each stage's force balance. lam_x (n_carried, n) belongs to whatever else the method
-   carries from step to step. accuracy: relative, to which an iteration has to go; 0: to rounding.
-6. `tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning)`: carries
-   changes forward through step w (in place) to its end or its point; dx (n_carried, n) as lam_x.
-7. `carried(steps) -> int`: rows of lam_x and dx; none for one-step methods.
-8. `steps_of(tag, arrays)`: the steps' tuple from the arrays of `steps.carve`, because what Python hands over are flat
-   arrays. The tag is a tuple of zeros; its length, which is part of its type, says which method is meant.
-9. `sample(steps, count, damped, t, g, d) -> m`: times, energies and their rates (NaN where unknown) by rising time,
-   without the first and the last state. May be left out where the stages are ordered and exact.
+1. `simulate`, the entry that fills the steps (see `runge_kutta.simulate` for its arguments). It lands on
+   every entry of `model.times`, solves the equations of each fixed step to rounding (of an adaptive one to the
+   tolerance), and keeps at each stage what the force balance saw (see `steps`).
+2. `point_of`: the state at a fraction of a step, to the order of the method, and where the reverse sweep has to start
+   for it. `reach`: with what that sweep needs; a method whose interpolation is a partial step keeps that step behind
+   the others. May be left out where `point_of` does it all.
+3. `parent_of`: the step before a step.
+4. `stage_weights`: weights of the stages in the integral over a step.
+5. `reverse_step`: a step of the reverse sweep.
+6. `tangent_step`: changes carried forward through a step.
+7. `carried`: how much else the method carries from step to step; nothing for one-step methods.
+8. `steps_of`: the steps' tuple from the arrays of `steps.carve`, because what Python hands over are flat arrays. The
+   tag is a tuple of zeros; its length, which is part of its type, says which method is meant.
+9. `sample`: energies and their rates along the motion, without its first and last state. May be left out where the
+   stages are ordered and exact.
 """
 
 from functools import partial
@@ -39,7 +32,7 @@ _MAKERS: dict[int, Implementation] = {}
 
 
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The state at a fraction of a step, by the method's own interpolation (duty 2).
+    """The state at a fraction of a step, by the method's own interpolation.
 
     Constant:
       model: the compiled scene.
@@ -61,7 +54,7 @@ def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
 
 
 def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The state at a fraction of a step, with all that a reverse sweep from there needs (duty 2).
+    """The state at a fraction of a step, with all that a reverse sweep from there needs.
 
     Constant:
       model: the compiled scene.
@@ -84,7 +77,7 @@ def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
 
 
 def sample(steps, count, damped, t, g, d):
-    """Times, stored energies and their rates along the motion, without its first and last state (duty 9).
+    """Times, stored energies and their rates along the motion, without its first and last state.
 
     In:
       steps: what the integrator kept.
@@ -101,12 +94,12 @@ def sample(steps, count, damped, t, g, d):
 
 
 def parent_of(steps, w):
-    """The step before step w, -1 where w begins at the start of the motion (duty 3)."""
+    """The step before step w, -1 where w begins at the start of the motion."""
     raise NotImplementedError
 
 
 def stage_weights(tables, steps, w, out):
-    """out (s,) = weights of the stages in the integral over step w (duty 4)."""
+    """out (s,) = weights of the stages in the integral over step w."""
     raise NotImplementedError
 
 
@@ -114,7 +107,7 @@ def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
-    """Carry derivatives of a response back through a step: its transposed linearisation (duty 5).
+    """Carry derivatives of a response back through a step: its transposed linearisation.
 
     In:
       pair (n_pair, 2): the bodies of each pair.
@@ -139,7 +132,7 @@ def reverse_step(
 
 
 def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Carry changes of the state forward through a step: its linearisation (duty 6).
+    """Carry changes of the state forward through a step: its linearisation.
 
     In:
       pair (n_pair, 2): the bodies of each pair.
@@ -161,12 +154,12 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
 
 
 def carried(steps):
-    """How many rows lam_x and dx have: none for one-step methods (duty 7)."""
+    """How many rows lam_x and dx have: none for one-step methods."""
     raise NotImplementedError
 
 
 def steps_of(tag, arrays):
-    """The tuple of steps of the arrays of `steps.carve`; the tag says of which method (duty 8)."""
+    """The tuple of steps of the arrays of `steps.carve`; the tag says of which method."""
     raise NotImplementedError
 
 
@@ -178,7 +171,7 @@ def implement(steps_type: type, tag: tuple[int, ...], steps_of: Implementation, 
 
 
 def _implementation(name: str, steps: Any) -> Implementation | None:
-    """The kernel that does the duty `name` for this type of steps; None where it is none of ours."""
+    """The kernel of the interface's function `name` for this type of steps; None where it is none of ours."""
     kind = getattr(steps, "instance_class", None)  # of a named tuple's type
     if kind is None:
         return None

@@ -119,7 +119,7 @@ def _ranges(case: Case, group: MemberGroup, index: int) -> Ranges:
 
 
 def _range(case: Case, group: MemberGroup, index: int, parameter: str, stated: float) -> tuple[float, float]:
-    """Between what a law's parameter is: its own value, or the bounds of the variable that has its place."""
+    """The lowest and highest value of a law's parameter: its own, or the bounds of the variable in its place."""
     for each in case.variables:
         own = group.name in each.groups and each.laws[each.groups.index(group.name)] == index
         if own and each.parameter == parameter:

@@ -122,7 +122,7 @@ class BundleMethod:
         state.penalty = RESTORED_PENALTY * state.penalty
 
     def _reset(self, state: State) -> bool:
-        """Drop rows from elsewhere, which may forbid what is possible; whether that was not too often at one place."""
+        """Drop rows of other designs, which may forbid what is possible; False where that was done too often here."""
         if state.resets >= RESETS:
             return False
         trust = RESET_TRUST * RESET_SHRINK**state.resets

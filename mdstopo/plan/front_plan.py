@@ -44,8 +44,7 @@ VISITED_GAIN = 1e-4
 REFINEMENTS, MOVED, MOVED_AGAIN = 4, 1e-6, 1e-3
 #: violation of a constraint, relative to its bound, up to which a design counts as feasible here
 TOLERATED = 1e-6
-#: methods that weigh, and those that spread points evenly
-WEIGHING = ("weighted_exponential", "weighted_sum", "weighted_min_max", "weighted_product")
+#: methods that spread points evenly
 SPREADING = ("nbi", "nc")
 
 

@@ -85,7 +85,7 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
         return None
     sample = problem.sample_of(evaluation)
     residual, rows, linear = _multipliers(problem, sample, x)
-    asked = problem.asked_of_members(evaluation, rows)
+    states = problem.pricing_states(evaluation, rows)
     gradients = gradients_of(sample)
     built = rows @ gradients + linear @ problem.linear.A
     scale = abs(sample.objective) or 1.0
@@ -94,7 +94,7 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
     gains: dict[str, Floats] = {}
     left: dict[str, float] = {}
     for group in case.priced_groups:
-        found = evaluator.candidates_of(group, count).go_through(asked, _worth(case, group, linear), MOST)
+        found = evaluator.candidates_of(group, count).go_through(states, _worth(case, group, linear), MOST)
         seen += found.seen + (len(group) if count is None else 0)
         best = max(best, found.best / scale)
         material = _material(case, group)

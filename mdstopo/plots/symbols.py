@@ -47,7 +47,7 @@ def symbols(case: Case, load_case: str | None = None, time: float | None = None)
 
 def _ties(case: Case) -> Iterator[Symbol]:
     for joint in case.joints:
-        far = (joint.bodies[1], np.array(joint.at_second)) if joint.type == "distance" else None
+        far = (joint.bodies[1], np.array(joint.at_second)) if joint.is_link else None
         way = getattr(joint, "axis", None)
         if case.dimension == 3:
             own: Any = joint

@@ -13,8 +13,7 @@ from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.case.uncertain import Measure
 from mdstopo.design_problem import competes, sign_of
 from mdstopo.engine import Evaluator
-from mdstopo.error_estimate import ErrorEstimate
-from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows
+from mdstopo.evaluation import USUAL, ErrorEstimate, Evaluation, FloatArray, Peak, Rows
 from mdstopo.integrators.steps import WORK_NAMES
 from mdstopo.robust.points import evaluator_at, name_of, nominal_evaluator
 from mdstopo.robust.robust_measures import rows, slopes
@@ -153,7 +152,7 @@ class Ensemble(Evaluator):
         """Bytes of the steps that are held between calls."""
         return super().held + sum(point.held for point in self.points.values())
 
-    def asked_of_members(self, weights: Mapping[str, Sequence[float]]) -> Any:
+    def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any:
         """As of `Evaluator`; every point is evaluated once more in this process, whoever did it before."""
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
         design = self._design.values.copy()
@@ -168,12 +167,12 @@ class Ensemble(Evaluator):
             for factor, peak in zip(factors, looked[key], strict=False):
                 assert peak.gradient is not None
                 shares += factor * peak.gradient
-        asked = []
+        states = []
         pieces = iter(np.split(shares, np.cumsum(list(counts.values()))[:-1]))
         for i, part in parts.items():
             own = {_key(place): next(pieces).tolist() for place, _ in _places(part)}
-            asked.append(self.points[i].asked_of_members(own))
-        return type(asked[0]).of_all(asked)
+            states.append(self.points[i].pricing_states(own))
+        return type(states[0]).of_all(states)
 
     # -- points
 

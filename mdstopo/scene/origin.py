@@ -186,7 +186,7 @@ def _contact(contact: AnyContact, origin: Point) -> AnyContact:
 
 
 def _looked(row: _Row, origin: Point) -> _Row:
-    """An objective or constraint; a point on ground that is looked at, from `origin`."""
+    """An objective or constraint; the place of its point, if that is on ground, counts from `origin`."""
     return replace(row, response=_seen(row.response, origin))
 
 

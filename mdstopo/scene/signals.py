@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import Load, LoadCase, Signal, Table
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.model import FloatArray, IndexArray
 
 
 def breakpoints(load_case: LoadCase, more: Iterable[float] = ()) -> FloatArray:
@@ -56,6 +56,20 @@ def formulas_of(load_case: LoadCase) -> list[TimeFormula]:
 def _nearness(start: float, end: float) -> float:
     """Times nearer to each other than this are the same, s."""
     return 1e-12 * (end - start) + 4e-15 * max(abs(start), abs(end))
+
+
+def parents_of(times: FloatArray, whole: FloatArray) -> tuple[IndexArray, FloatArray]:
+    """Of each segment between the times `whole` (m + 1,) the one between `times` that it lies in, (m,), and how long
+    after that one's start it begins, (m,) in s."""
+    parent = np.clip(np.searchsorted(times, whole[:-1], side="right") - 1, 0, len(times) - 2)
+    return parent, whole[:-1] - times[parent]
+
+
+def cut_linear(array: FloatArray, parent: IndexArray, tau: FloatArray) -> FloatArray:
+    """Values at starts of segments and slopes (n_seg, ..., 2), for the parts of these that `parents_of` tells."""
+    part = array[parent].copy()
+    part[..., 0] += tau.reshape(-1, *[1] * (part.ndim - 2)) * part[..., 1]
+    return part
 
 
 def segment_values(signal: Signal, times: FloatArray) -> FloatArray:

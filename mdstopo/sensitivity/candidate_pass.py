@@ -76,28 +76,28 @@ class CandidatePass(ABC, Generic[A]):
         self.chosen = spread(len(self.homes[0]), len(self.homes[1]), count)
 
     @abstractmethod
-    def tiles(self, asked: A, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
+    def tiles(self, states: A, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
         """(T, TILE_NUMBERS): what the pass keeps of each tile; worth: of a unit of cost; built: of `_by_tile`."""
 
     @abstractmethod
-    def prices_between(self, asked: A, a: IndexArray, b: IndexArray) -> FloatArray:
+    def prices_between(self, states: A, a: IndexArray, b: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from first points to second ones."""
 
-    def prices(self, asked: A, i: IndexArray, j: IndexArray) -> FloatArray:
+    def prices(self, states: A, i: IndexArray, j: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from points P (K,) to points Q (K,)."""
-        return self.prices_between(asked, *(i, j)[self.order])
+        return self.prices_between(states, *(i, j)[self.order])
 
-    def go_through(self, asked: A, worth: float, most: int) -> Passed:
+    def go_through(self, states: A, worth: float, most: int) -> Passed:
         """A pass over all of them; most: how many are told.
 
         worth: of a unit of cost, the multipliers of volume rows.
         """
-        tiles = self.tiles(asked, worth, self._by_tile())
+        tiles = self.tiles(states, worth, self._by_tile())
         best = tiles[:, BEST]
         by_gain = np.argsort(-best, kind="stable")
         chosen = by_gain[:TILES]
         a, b, rank, gain = (np.concatenate(each) for each in zip(
-            *(self._of_tile(asked, int(tile), worth) for tile in chosen), strict=True
+            *(self._of_tile(states, int(tile), worth) for tile in chosen), strict=True
         ))  # fmt: skip
         # of every tile some before more of any: neighbours are alike
         order = np.lexsort((-gain, rank // SHARE))[:most]
@@ -140,7 +140,7 @@ class CandidatePass(ABC, Generic[A]):
             inside &= chosen[np.minimum(place, len(chosen) - 1)] == index
         return found[0][inside], found[1][inside]
 
-    def _of_tile(self, asked: A, tile: int, worth: float) -> tuple[IndexArray, IndexArray, IndexArray, FloatArray]:
+    def _of_tile(self, states: A, tile: int, worth: float) -> tuple[IndexArray, IndexArray, IndexArray, FloatArray]:
         """Of all candidates of a tile that may enter: the places of their points among those that are looked at, their
         ranks in the tile, and their gains."""
         rows, columns = self.chosen
@@ -155,7 +155,7 @@ class CandidatePass(ABC, Generic[A]):
         new &= (length >= self.candidates.shortest) & (length <= self.candidates.longest) & (length > 0.0)
         a, b, length = a[new], b[new], length[new]
         cost = length if self.candidates.cost is None else self.candidates.cost
-        gain = -self.upper * (self.prices_between(asked, rows[a], columns[b]) + worth * cost)
+        gain = -self.upper * (self.prices_between(states, rows[a], columns[b]) + worth * cost)
         rank = np.empty(len(gain), dtype=np.intp)
         rank[np.argsort(-gain, kind="stable")] = np.arange(len(gain))
         return a, b, rank, gain

@@ -46,7 +46,7 @@ def slope_at(model, strength, q, v, rel, sums, out):
 
 
 @kernel
-def look_at_row(model, tables, strength, steps, count, damped, row, q, v, rel, sums, mu_q, work):
+def state_of_row(model, tables, strength, steps, count, damped, row, q, v, rel, sums, mu_q, work):
     """Find the state of a row that `evaluate_responses` found, and the slope of the stored energy there.
 
     Constant:
@@ -208,7 +208,7 @@ def direct(
             integral = True
             continue
         for r in range(found[j]):
-            w, _ = look_at_row(
+            w, _ = state_of_row(
                 model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
                 rel, sums, mu[j, r], work,
             )  # fmt: skip
@@ -250,7 +250,7 @@ def direct(
                 if r >= found[j] or spread[j] or before[j, r] != k - 1:
                     continue
                 # found again: a partial step behind the others has been overwritten by that of the next row
-                w, c = look_at_row(
+                w, c = state_of_row(
                     model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
                     rel, sums, mu[j, r], work,
                 )  # fmt: skip

@@ -20,7 +20,7 @@ from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
 from mdstopo.mechanics.passes import SUMS
 from mdstopo.scene.model import DAMPING, DESIGN, EXCESS, KIND, L0, PAIR, PRELOAD, PX, PY, QX, QY, START, STIFFNESS, STOP
 from mdstopo.scene.packing import unpack
-from mdstopo.sensitivity.direct import finish_rows, integral_weights, look_at_row
+from mdstopo.sensitivity.direct import finish_rows, integral_weights, state_of_row
 from mdstopo.sensitivity.propagation import STRIP, add_three
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
 
@@ -163,7 +163,7 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):
 
 
 @kernel
-def _look(mu, weight_q, weight_v, sq, sv, lo, hi, out):
+def _add_change(mu, weight_q, weight_v, sq, sv, lo, hi, out):
     """Add mu . (weight_q dq + weight_v dv) for the members in places lo to hi.
 
     In:
@@ -254,7 +254,7 @@ def iterative(
             integral = True
             continue
         for r in range(found[j]):
-            place[j, r], fraction[j, r] = look_at_row(
+            place[j, r], fraction[j, r] = state_of_row(
                 model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
                 rel[:1], sums, mu[j, r], work,
             )  # fmt: skip
@@ -297,7 +297,7 @@ def iterative(
                     for r in range(found[j]):
                         if place[j, r] == w and fraction[j, r] >= 0.0:
                             q0, v0, _, _, _, _, _, _ = hermite(fraction[j, r])
-                            _look(mu[j, r], q0, h * v0, sq, sv, lo, hi, padded[j, r])
+                            _add_change(mu[j, r], q0, h * v0, sq, sv, lo, hi, padded[j, r])
                 for j in range(last + 1):
                     k = steps.K[o + j]
                     c = steps.C[o + j] if damped else k
@@ -368,6 +368,6 @@ def iterative(
                         if place[j, r] == w:
                             at = fraction[j, r]
                             _, _, q1, v1, _, _, _, _ = hermite(at if at >= 0.0 else 1.0)
-                            _look(mu[j, r], q1, h * v1, sq, sv, lo, hi, padded[j, r])
+                            _add_change(mu[j, r], q1, h * v1, sq, sv, lo, hi, padded[j, r])
     finish_rows(model, alpha, steps, count, reductions, found, weight, states, padded, total, gradients)
     return -1

@@ -1,4 +1,4 @@
-"""From Python to the compiled entries that price candidates (`candidate_prices`): what they ask for, what they tell."""
+"""From Python to the compiled entries that price candidates (`candidate_prices`): their arguments and results."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 AT_ONCE = 1 << 16
 
 
-class Asked(NamedTuple):
-    """What a weighted sum of rows asks of members, whatever they are.
+class SpringPricingStates(NamedTuple):
+    """The states from which the price of any member follows, of a weighted sum of rows.
 
     pose (S, n_pair, POSE) and change (S, n_pair, 3): relative poses and their virtual changes; point (E, n_pair, POSE)
     and weight (E,): relative poses, and the weights of the stored energy in them.
@@ -53,12 +53,12 @@ class Asked(NamedTuple):
     weight: FloatArray
 
     @classmethod
-    def of_all(cls, parts: "Sequence[Asked]") -> "Asked":
-        """What several motions of the same bodies ask together."""
+    def of_all(cls, parts: "Sequence[SpringPricingStates]") -> "SpringPricingStates":
+        """Those of several motions of the same bodies together."""
         return cls(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def of_pair(self, pair: int) -> "tuple[FloatArray, FloatArray, FloatArray]":
-        """Poses (S + E, 1, POSE), changes (S, 1, 3), weights (E,) of one pair, without those that ask for nothing."""
+        """Poses (S + E, 1, POSE), changes (S, 1, 3), weights (E,) of one pair, without those that change no price."""
         moved = self.change[:, pair].any(axis=1)
         seen = self.weight != 0.0
         poses = np.concatenate([self.pose[moved, pair], self.point[seen, pair]])[:, None]
@@ -66,8 +66,8 @@ class Asked(NamedTuple):
         return np.ascontiguousarray(poses), changes, self.weight[seen]
 
 
-def asked_of(driver: "SpringsDriver", factor: FloatArray) -> Asked:
-    """What the rows of a driver's last evaluation ask of members, each times its factor (n_obj, R)."""
+def pricing_states_of(driver: "SpringsDriver", factor: FloatArray) -> SpringPricingStates:
+    """The states from which prices follow, of the rows of a driver's last evaluation times factor (n_obj, R)."""
     n, n_pair, damped, turning = driver.shape
     limits = [int(each) for each in driver.limits]
     index = carve.py_func(driver.room, driver.room_ints, n, n_pair, limits[1], limits[2], damped, turning)[2]  # type: ignore[attr-defined]
@@ -82,11 +82,11 @@ def asked_of(driver: "SpringsDriver", factor: FloatArray) -> Asked:
             driver.room_ints, driver.strength, stages, pose, change, point, weight, np.zeros(WORK, dtype=np.int64),
         )  # fmt: skip
         if poses != NO_ROOM:
-            return Asked(pose[:poses], change[:poses], point[:points], weight[:points])
+            return SpringPricingStates(pose[:poses], change[:poses], point[:points], weight[:points])
         more *= 4
 
 
-class SpringCandidates(CandidatePass[Asked]):
+class SpringCandidates(CandidatePass[SpringPricingStates]):
     """The candidates of a group of springs between free bodies, in the plane.
 
     group: as the scene has it; block: its row of `Model.block`; homes, count: as of `CandidatePass`.
@@ -107,7 +107,7 @@ class SpringCandidates(CandidatePass[Asked]):
         self._first, self._second = (group.from_local, group.to_local)[self.order]
         self._far = float(np.sqrt((self._second**2).sum(axis=1).max()))
 
-    def tiles(self, asked: Asked, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
+    def tiles(self, states: SpringPricingStates, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
         """(T, TILE_NUMBERS): what `price_candidates` keeps of each tile."""
         law, common = self._law, self.common(worth)
         common[[K, C, F0]] = law.stiffness, law.damping, law.preload
@@ -116,15 +116,15 @@ class SpringCandidates(CandidatePass[Asked]):
         first, second = _padded(self._first[rows], TALL), _padded(self._second[columns], BROAD)
         homes = _padded(self.homes[0][rows], TALL), _padded(self.homes[1][columns], BROAD)
         out = np.empty((*self.shape, TILE_NUMBERS))
-        pose, change, weight = asked.of_pair(self.pair)
+        pose, change, weight = states.of_pair(self.pair)
         kernels.price_candidates(
             first, second, *homes, common, self._kind, pose, change, weight, *built, allowed(), out
         )
         return out.reshape(-1, TILE_NUMBERS)
 
-    def prices_between(self, asked: Asked, a: IndexArray, b: IndexArray) -> FloatArray:
+    def prices_between(self, states: SpringPricingStates, a: IndexArray, b: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from first points to second ones."""
-        law, own = self._law, asked.of_pair(self.pair)
+        law, own = self._law, states.of_pair(self.pair)
         found, lengths = np.empty(len(a)), lengths_between(self.homes[0][a], self.homes[1][b])
         for start in range(0, len(a), AT_ONCE):
             part = slice(start, start + AT_ONCE)

@@ -8,17 +8,18 @@ import numpy as np
 
 from mdstopo.case.model import Case, MemberGroup
 from mdstopo.integrators.driver import Driver
-from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
+from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.diagnosis import Diagnosis
 from mdstopo.scene.model import FloatArray
 from mdstopo.scene.modes import Modes
+from mdstopo.scene.settled import Settled
 from mdstopo.sensitivity.reductions import INTEGRALS, REDUCTIONS
+from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
-    from mdstopo.general.settle import Settled
-    from mdstopo.sensitivity.pricing import Asked, SpringCandidates
+    from mdstopo.sensitivity.pricing import SpringCandidates, SpringPricingStates
 
 
 class SpringsDriver(Driver):
@@ -70,11 +71,11 @@ class SpringsDriver(Driver):
         """The status of a run that ended at `time` in a state (2, n), and who is to blame, in words."""
         return self._diagnosis.explain(alpha, status, time, q, v)
 
-    def asked_of_members(self, factor: FloatArray) -> "Asked":
-        """What rows of the last evaluation, each times its factor (n_obj, R), ask of any member; with gradients."""
-        from mdstopo.sensitivity.pricing import asked_of
+    def pricing_states(self, factor: FloatArray) -> "SpringPricingStates":
+        """The states from which prices follow, of the rows of the last evaluation times factor (n_obj, R)."""
+        from mdstopo.sensitivity.pricing import pricing_states_of
 
-        return asked_of(self, factor)
+        return pricing_states_of(self, factor)
 
     def start_modes(self, alpha: FloatArray) -> Modes:
         """Small motion about the start."""
@@ -82,7 +83,7 @@ class SpringsDriver(Driver):
 
         return start_modes(self.case, self.scene, alpha)
 
-    def settled(self, alpha: FloatArray) -> "Settled | None":
+    def settled(self, alpha: FloatArray) -> Settled | None:
         """None: a case that settles is none of springs between free bodies."""
         return None
 

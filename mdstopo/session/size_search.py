@@ -56,7 +56,7 @@ class Catalogued(NamedTuple):
         return self._with(self.sizes, x, choice)
 
     def paid(self, x: Floats, choice: Ints) -> Floats:
-        """x with the prices of these sizes."""
+        """The problem's variables x with the prices of these sizes in their places."""
         return self._with(self.prices, x, choice)
 
     def _with(self, offered: tuple[Floats, ...], x: Floats, choice: Ints) -> Floats:
@@ -269,7 +269,7 @@ class SizeSearch:
         return min(found, key=lambda each: each.best_objective, default=None)
 
     def _relaxed(self, node: Node) -> Within:
-        """The problem of a node: any number within its ranges, at the least price that sizes there allow."""
+        """The problem of a node, relaxed: any number within its ranges, at the lowest price of a size there."""
         lower, upper = self._problem.lower.copy(), self._problem.upper.copy()
         slope, offset = np.ones((len(self._rows), len(lower))), np.zeros((len(self._rows), len(lower)))
         for k, place in enumerate(self._catalogued.place.tolist()):

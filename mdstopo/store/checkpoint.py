@@ -36,7 +36,7 @@ class Checkpointer:
         self.count = 0
 
     def offer(self, urgent: bool = False) -> bool:
-        """To be called after each iteration; true if a checkpoint was written.
+        """Write a checkpoint if it is time, after each iteration; whether one was written.
 
         urgent: what has just been reached took long, so that it is to be saved unless saving takes longer still.
         """

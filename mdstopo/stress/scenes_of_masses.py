@@ -130,7 +130,7 @@ def _spun(case: "Case") -> float:
 
 
 def scenes() -> list[Scene]:
-    """Every order of the masses on one integrator, the others on one order."""
+    """Every order of the masses with one integrator, one order with the others."""
     found = []
     for order, integrator in (((0, 1, 2), "gauss"), ((2, 0, 1), "gauss"), ((0, 1, 2), "runge_kutta")):
         found.append(

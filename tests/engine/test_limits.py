@@ -88,7 +88,7 @@ def test_what_turns_without_feeling_it_is_looked_at_all_the_way_round(driven, in
 
 @pytest.mark.parametrize("integrator", ["gauss", "runge_kutta"])
 def test_steps_that_memory_does_not_hold_are_too_many(integrator, monkeypatch):
-    monkeypatch.setattr("mdstopo.integrators.driver.holds_steps", lambda floats: False)
+    monkeypatch.setattr("mdstopo.case.memory.most_floats", lambda: 0)
     found = evaluate(read(spring_scene(end=5000.0, **LOADED), integrator=integrator))
     assert found.status is Status.STEP_LIMIT
     assert "the fastest body is mass" in found.message

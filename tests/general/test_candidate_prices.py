@@ -201,7 +201,7 @@ class Priced:
         assert evaluation.status.ok, evaluation.message
         sample = problem.sample_of(evaluation)
         factor = np.linspace(1.0, 0.5, len(sample.rows) + len(sample.constraint_rows))
-        self.asked = problem.asked_of_members(evaluation, factor)
+        self.states = problem.pricing_states(evaluation, factor)
         at = group.from_index * len(group.to_local) + group.to_index
         self.built = np.isin(self.i * len(group.to_local) + self.j, at)
         alpha = np.zeros(whole.n_design)
@@ -217,7 +217,7 @@ class Priced:
     @property
     def error(self):
         """The largest difference of a price, relative to the largest one."""
-        return np.abs(self.candidates.prices(self.asked, self.i, self.j) - self.gradient).max() / self.size
+        return np.abs(self.candidates.prices(self.states, self.i, self.j) - self.gradient).max() / self.size
 
 
 @pytest.mark.parametrize("name", [name for name in SMOOTH if name not in IN_SPACE])
@@ -250,7 +250,7 @@ def test_a_pass_finds_the_best_candidates_and_what_all_gain():
     gradient, size = scene.gradient, scene.size
     worth = 0.1 * size
     gain = np.where(scene.built, -np.inf, -(gradient + worth))
-    found = scene.candidates.go_through(scene.asked, worth, 10**6)
+    found = scene.candidates.go_through(scene.states, worth, 10**6)
     assert found.seen == (~scene.built).sum()
     assert abs(found.best - max(gain.max(), 0.0)) <= AGREE * size
     assert abs(found.together - np.maximum(gain, 0.0).sum()) <= 1e-9 * len(gain) * size
@@ -263,8 +263,8 @@ def test_a_pass_finds_the_best_candidates_and_what_all_gain():
 
 def test_a_pass_over_a_part_of_the_candidates_prices_them_as_the_whole_pass_does():
     scene = Priced(SWITCHED["clipped"])
-    part = scene.evaluator.candidates_of(scene.case.members[0], 60).go_through(scene.asked, 0.0, 10**6)
-    whole = scene.candidates.go_through(scene.asked, 0.0, 10**6)
+    part = scene.evaluator.candidates_of(scene.case.members[0], 60).go_through(scene.states, 0.0, 10**6)
+    whole = scene.candidates.go_through(scene.states, 0.0, 10**6)
     assert 30 < part.seen < 100 < whole.seen
     prices = np.full((9, 21), np.nan)
     prices[whole.i, whole.j] = whole.gain
@@ -276,7 +276,7 @@ def test_a_pass_does_not_depend_on_threads(monkeypatch):
     found = []
     for threads in ("1", "3"):
         monkeypatch.setenv("MDSTOPO_THREADS", threads)
-        found.append(scene.candidates.go_through(scene.asked, 0.1 * scene.size, 100))
+        found.append(scene.candidates.go_through(scene.states, 0.1 * scene.size, 100))
     one, other = found
     assert (one.seen, one.best, one.together, one.ratio) == (other.seen, other.best, other.together, other.ratio)
     assert np.array_equal(one.i, other.i)

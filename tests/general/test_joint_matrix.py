@@ -126,7 +126,7 @@ def test_a_parallelogram_is_singular_where_it_lies_flat_and_a_joint_is_to_blame(
     singular, _, _ = solved(model, q, np.ones(12), np.ones(8))
     assert (singular == -1) == regular
     if not regular:
-        assert int(np.flatnonzero(model.place == singular)[0]) >= 12  # a row, no coordinate
+        assert int(np.flatnonzero(model.unknown_index == singular)[0]) >= 12  # a row, no coordinate
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -188,7 +188,7 @@ def test_it_costs_a_closed_loop_what_its_length_costs():
         )
         joints += f"  - {{type: revolute, bodies: [ground, b0], at: [{x[0]}, {y[0]}]}}\n"
         model = model_of(f"format: 1\ntime: {{end: 1}}\nbodies:\n{bodies}joints:\n{joints}")
-        first = model.envelope[:, 0].tolist()
+        first = model.skyline[:, 0].tolist()
         products = sum(j - max(first[i], first[j]) for i in range(len(first)) for j in range(first[i], i))
         costs.append((int(model.size[3]), products))
     for short, long in zip(*costs, strict=True):

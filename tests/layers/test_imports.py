@@ -26,6 +26,12 @@ def test_a_contract_has_no_exceptions(name: str) -> None:
     assert not {key for key in contract(name) if key.startswith(("ignore", "allow", "unmatched"))}
 
 
+def test_imports_for_types_count() -> None:
+    parser = ConfigParser()
+    parser.read(ROOT / ".importlinter", encoding="utf-8")
+    assert not parser["importlinter"].getboolean("exclude_type_checking_imports", fallback=False)
+
+
 def test_every_module_has_a_layer() -> None:
     told = " ".join(contract("layers")["layers"]).replace("|", " ").replace(":", " ").split()
     inside = list((ROOT / "mdstopo").iterdir())

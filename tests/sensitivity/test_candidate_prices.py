@@ -92,31 +92,31 @@ def priced(scene):
     evaluation = problem.evaluation(x)
     sample = problem.sample_of(evaluation)
     factor = np.linspace(1.0, 0.5, len(sample.rows))
-    asked = problem.asked_of_members(evaluation, factor)
+    states = problem.pricing_states(evaluation, factor)
     there = np.isin(i * len(group.to_local) + j, group.from_index * len(group.to_local) + group.to_index)
     alpha = np.zeros(whole.n_design)
     alpha[: len(i)][there] = x[: len(group)]
     alpha[len(i) :] = x[len(group) :]
     found = Evaluator(whole).problem().evaluate(alpha)
     assert np.allclose(found.rows, sample.rows, rtol=1e-12, atol=0)
-    return evaluator.candidates_of(group), (i, j), asked, (factor @ found.gradients)[: len(i)], there, case
+    return evaluator.candidates_of(group), (i, j), states, (factor @ found.gradients)[: len(i)], there, case
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_prices_are_the_gradient_of_candidates_that_are_built(name):
-    candidates, (i, j), asked, gradient, _, _ = priced(SCENES[name])
+    candidates, (i, j), states, gradient, _, _ = priced(SCENES[name])
     assert len(i) > 300
-    assert np.abs(candidates.prices(asked, i, j) - gradient).max() <= AGREE * np.abs(gradient).max()
+    assert np.abs(candidates.prices(states, i, j) - gradient).max() <= AGREE * np.abs(gradient).max()
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_a_pass_finds_the_best_candidates_and_what_all_gain(name):
-    candidates, (i, j), asked, gradient, there, case = priced(SCENES[name])
+    candidates, (i, j), states, gradient, there, case = priced(SCENES[name])
     group = case.members[0]
     cost = np.hypot(*(group.to_world[j] - group.from_world[i]).T) if group.candidates.cost is None else 1.0
     worth = 0.1 * np.abs(gradient).max()
     gain = np.where(there, -np.inf, -(gradient + worth * cost))
-    found = candidates.go_through(asked, worth, 10**6)
+    found = candidates.go_through(states, worth, 10**6)
     size = np.abs(gradient).max()
     assert found.seen == (~there).sum()
     assert abs(found.best - max(gain.max(), 0.0)) <= AGREE * size
@@ -132,20 +132,20 @@ def test_a_pass_finds_the_best_candidates_and_what_all_gain(name):
 
 
 def test_of_many_that_pay_some_of_every_tile_are_told():
-    candidates, _, asked, gradient, _, _ = priced(SCENES["max"])
-    found = candidates.go_through(asked, -10.0 * np.abs(gradient).max(), 40)
+    candidates, _, states, gradient, _, _ = priced(SCENES["max"])
+    found = candidates.go_through(states, -10.0 * np.abs(gradient).max(), 40)
     tiles = set(zip((found.i // TALL).tolist(), (found.j // BROAD).tolist(), strict=True))
     assert len(found.i) == 40
     assert len(tiles) >= 4
 
 
 def test_a_pass_does_not_depend_on_threads(monkeypatch):
-    candidates, _, asked, gradient, _, _ = priced(SCENES["mean"])
+    candidates, _, states, gradient, _, _ = priced(SCENES["mean"])
     worth = 0.1 * np.abs(gradient).max()
     monkeypatch.setenv("MDSTOPO_THREADS", "1")
-    alone = candidates.go_through(asked, worth, 100)
+    alone = candidates.go_through(states, worth, 100)
     monkeypatch.setenv("MDSTOPO_THREADS", "3")
-    shared = candidates.go_through(asked, worth, 100)
+    shared = candidates.go_through(states, worth, 100)
     assert (alone.best, alone.together, alone.ratio, alone.seen) == (
         shared.best, shared.together, shared.ratio, shared.seen
     )  # fmt: skip

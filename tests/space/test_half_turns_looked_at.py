@@ -46,7 +46,7 @@ def test_a_rotation_at_the_end_and_the_motion_itself_go_on_beyond_half_a_turn() 
 
 
 def test_what_fills_the_memory_is_told_with_what_helps(monkeypatch) -> None:
-    monkeypatch.setattr("mdstopo.general.general_driver.most_floats", lambda: 0)
+    monkeypatch.setattr("mdstopo.case.memory.most_floats", lambda: 0)
     case = mdstopo.load_case(CASES / "springs.yaml", overrides={"time.end": 20})
     found = mdstopo.evaluate(case, gradient=False)
     assert found.status is Status.STEP_LIMIT
@@ -60,7 +60,7 @@ def test_room_grows_as_far_as_memory_goes(monkeypatch) -> None:
 
     driver = evaluator_of(load("springs")).driver("default")
     before = len(driver.room)
-    monkeypatch.setattr("mdstopo.general.general_driver.most_floats", lambda: int(1.5 * before))
+    monkeypatch.setattr("mdstopo.case.memory.most_floats", lambda: int(1.5 * before))
     assert driver._grow()
     assert 1.4 * before < len(driver.room) <= 1.5 * before
     assert not driver._grow()

@@ -22,6 +22,7 @@ class DistanceJoint(Joint):
         Key("at", TWO_POINTS, "a point on the first body and a point on the second", required=True, unit="m"),
     )
     kernels: ClassVar[str] = "mdstopo.mechanics.joints.distance"
+    is_link: ClassVar[bool] = True
 
     length: float
 

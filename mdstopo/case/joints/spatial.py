@@ -146,6 +146,7 @@ class SpatialDistanceJoint(SpatialJoint):
         Key("at", TWO_POINTS, "a point on the first body and a point on the second", required=True, unit="m"),
     )
     rows: ClassVar[int] = 1
+    is_link: ClassVar[bool] = True
 
     length: float
 

@@ -158,7 +158,7 @@ def _marked(p, mode, curves):
 @inline
 def _seen(p, x, xd, mode, t, curves, l0, switch):
     """The margin of a switch, signed so that it is not negative in the mode, its slopes by x, xd and t, and 1 where it
-    is looked at.
+    is evaluated.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -178,7 +178,7 @@ def _seen(p, x, xd, mode, t, curves, l0, switch):
 
 @inline
 def _lowest(p, x, xd, mode, t, curves, l0):
-    """The smallest margin, its slopes by x, xd and t, and whose it is: -1 where no switch is looked at.
+    """The smallest margin, its slopes by x, xd and t, and whose it is: -1 where no switch is evaluated.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -240,7 +240,7 @@ def expression_margins(p, curves):
 
 @inline
 def expression_one_margin(p, which, x, xd, mode, t, curves, l0):
-    """One margin and its slopes by x, xd and t; infinite where it is not looked at.
+    """One margin and its slopes by x, xd and t; infinite where it is not evaluated.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     which: of which switch.
@@ -365,7 +365,7 @@ def _side(p, x, xd, xdd, mode, t, curves, l0, switch):
 def expression_next(p, x, xd, xdd, mode, t, curves, l0):
     """The mode behind the end of a mode: the switch whose margin is used up changes sides.
 
-    With it do those whose margins it makes another, and those that are looked at only then, which may have changed
+    With it do those whose margins it makes another, and those that are evaluated only then, which may have changed
     sides unseen: they get the side on which they are.
 
     p (PARAMETERS,): its parameters, and where its data begin.

@@ -1,0 +1,32 @@
+"""The compiled entries of a method of integration for general scenes: its own `simulate`, and those of all methods.
+
+The latter know a method by its tag (`method_interface`).
+"""
+
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from mdstopo.case.integrators import IntegratorKind
+from mdstopo.general import dense_output, direct, integral_gradients, peak_search, row_sweep
+
+
+class Entries(NamedTuple):
+    """What the driver calls; TAG: of the method."""
+
+    TAG: tuple[int, ...]
+    simulate: Any
+    compare: Any = dense_output.compare
+    follow: Any = direct.follow
+    integral_with_gradient: Any = integral_gradients.integral_with_gradient
+    peaks_of_pieces: Any = peak_search.peaks_of_pieces
+    peaks_of_steps: Any = peak_search.peaks_of_steps
+    push: Any = direct.push
+    rank_rows: Any = peak_search.rank_rows
+    rows_vjp: Any = row_sweep.rows_vjp
+    sample_response: Any = dense_output.sample_response
+
+
+def entries_of(kind: IntegratorKind) -> Entries:
+    """The entries of a method."""
+    own: Any = import_module(kind.general)
+    return Entries(own.TAG, own.simulate)
