@@ -14,7 +14,7 @@ from typing import Any
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.candidates import with_start_set
 from mdstopo.case.contacts import build_contacts
-from mdstopo.case.definitions import MARK, SECTION, with_numbers
+from mdstopo.case.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.extending import KEY, CannotExtendError, extended, text_of_tree
@@ -71,11 +71,13 @@ def read_case(
     overrides: Mapping[str, Any] | None = None,
     sha256: str | None = None,
     without: tuple[str, ...] = (),
+    at: Mapping[str, float] | None = None,
 ) -> Case:
     """The case in `text`; raises CaseError as `load_case`.
 
     path: where the text comes from; included files are relative to it, else to the current folder.
-    sha256: of the file's bytes, where they are not the text in UTF-8. without: sections that are not read.
+    sha256: of the file's bytes, where they are not the text in UTF-8. without: sections that are not read. at: by key
+    path, numbers in the place of what expressions come to.
     """
     place = None if path is None else Path(path)
     file = "<text>" if path is None else str(path)
@@ -89,8 +91,11 @@ def read_case(
     root, texts = apply_overrides(root, overrides or {}, reading.mistakes.append)
     if KEY in root.entries:
         reading.mistake(KEY, "can only be stated in the file", root.entries[KEY][1])
+    written = root = beginning(root)
     if MARK in whole_text or SECTION in root.entries or any(MARK in each for each in texts.values()):
         root = with_numbers(root, reading)
+    if at:
+        root, _ = apply_overrides(root, at, reading.mistakes.append)
     if without:
         whole, root = root, root.at(root.line, root.column)
         root.entries = {key: entry for key, entry in whole.entries.items() if key not in without}
@@ -98,7 +103,7 @@ def read_case(
     geometry = geometry_in(root, reading)
     top = geometry.format.read(root, "", reading)
     assert isinstance(top, Fields)
-    parts = _build(top, root, geometry, reading)
+    parts = _build(top, root, written, geometry, reading)
     if top["uncertainty"] is not None:
         from mdstopo.case.uncertainty import build_uncertainty  # most cases have none
 
@@ -145,8 +150,11 @@ def _parsed(text: str, reading: Reading, file: str) -> Node:
     return root
 
 
-def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dict[str, Any]:
-    """The parts of the case, as far as they can be made; notes every mistake on the way."""
+def _build(top: Fields, root: Node, written: Node, geometry: Geometry, reading: Reading) -> dict[str, Any]:
+    """The parts of the case, as far as they can be made; notes every mistake on the way.
+
+    written: the whole case with its expressions, which are numbers in root.
+    """
     declare_joints(top["joints"], reading)
     _check_references(top, reading)
     times = windows(top, reading)
@@ -159,7 +167,7 @@ def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dic
     complete = isinstance(top["members"], dict) and len(made) == len(top["members"])
     groups = designed if complete or top["members"] is None else None
     motions = {case: build_motions(by_body, geometry) for case, by_body in by_case.items()}
-    variables = build_variables(top, groups, reading)
+    variables, follows = build_variables(top, groups, written, reading)
     movable, coordinates = build_movable(top, points, groups, frames, reading)
     variables += coordinates
     warn_assemble(top, reading)
@@ -179,6 +187,7 @@ def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dic
         "solver": build_solver(top["solver"], times, reading),
         "variables": variables,
         "movable": movable,
+        "follows": follows,
         "dimension": geometry.number,
         "fit": _fit(top, root, frames, reading),
         **build_shared(top, groups, reading),

@@ -68,6 +68,8 @@ class Reading:
         self.unit = ""
         #: by their path, the SI values of numbers that were written with a unit
         self.measured: dict[str, float] = {}
+        #: by the path of a number that follows from a defined name which is a design variable: that variable
+        self.followed: dict[str, str] = {}
         self.mistakes: list[Mistake] = []
         self.warnings: list[Mistake] = []
         self.files: dict[str, str] = {}
