@@ -80,6 +80,13 @@ class Reading:
         self._included: dict[str, bytes | str] = {}
         self._ignored: set[tuple[int, int, str]] = set()
 
+    def again(self) -> Reading:
+        """A reading of the same file that goes on from here; what it notes is its own."""
+        other = Reading(self.folder)
+        other.mistakes, other.warnings, other.files = [*self.mistakes], [*self.warnings], dict(self.files)
+        other._ignored, other._included = set(self._ignored), self._included
+        return other
+
     def mark(self, path: str, node: Node, key: Node | None = None) -> None:
         """Note the place of `path`: its value's, or its key's where the value begins on a later line."""
         at = key if key is not None and (key.line != node.line or key.origin != node.origin) else node

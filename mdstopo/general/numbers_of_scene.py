@@ -21,12 +21,14 @@ from mdstopo.general.model import VARIED_COLUMNS, GeneralModel, pack_general
 from mdstopo.general.moved_ends import WIDTH
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.through import BESIDE_SCENE, case_with
+from mdstopo.scene.through import BESIDE_SCENE, CasesWith
 
 #: the arrays of a scene that may follow from names, besides places of members and numbers of laws
 BALANCE = ("mass", "v0", "force", "load_arm", "load_force", "steady")
 #: how far names are shifted, relative to their size, and how large they are at least, as a share of their range
 SHIFT, LEAST = 1e-4, 3e-3
+#: what arrays that are the same may differ by, relative to their largest number
+ROUNDED = 1e-11
 ALLOWED = "masses, inertias, gravity, loads over given times, and velocities at the start"
 
 
@@ -38,6 +40,7 @@ class NumbersOfScene:
         self._case, self._load_case, self._model = case, load_case, model
         self._numbers = case.follows.numbers
         self._expressions = expressions_of(case.follows, self._numbers)
+        self._there = CasesWith(case, self._numbers, BESIDE_SCENE)
         #: how many names there are
         self.count = len(case.follows.names)
         self._least = [LEAST * (each.upper - each.lower) for each in names_of(case)]
@@ -76,7 +79,7 @@ class NumbersOfScene:
     def _arrays(self, values: FloatArray) -> dict[str, Any]:
         """The arrays `BALANCE` with values (K,) of what follows."""
         case, model, dimension = self._case, self._model, dimension_of(self._case)
-        load_case = case_with(case, self._numbers, values, BESIDE_SCENE).load_case(self._load_case.name)
+        load_case = self._there.at(values).load_case(self._load_case.name)
         mass, v0 = model.mass.copy(), model.v0.copy()
         bodies = dimension.kinematics
         for i, body in enumerate(load_case.bodies):
@@ -116,12 +119,13 @@ def refuse_other_places(case: Case, compiled: Callable[[Case, LoadCase], General
     for key in ("settle", "assemble"):
         if getattr(case.solver, key):
             _refuse(case, expressions.depends(0)[0], f"{follows.numbers[0].key}, which does not go with solver.{key}")
+    cases = CasesWith(case, follows.numbers)
     before = {each.name: compiled(_plain(case), each) for each in case.load_cases}
 
     def moves_more(which: IndexArray) -> bool:
         shifted = values.copy()
         shifted[which] += SHIFT * np.where(values[which] == 0.0, 1.0, np.abs(values[which]))
-        there = _plain(case_with(case, follows.numbers, shifted))
+        there = _plain(cases.at(shifted))
         for load_case in there.load_cases:
             one, other = before[load_case.name], compiled(there, load_case)
             if any(_differ(name, getattr(one, name), getattr(other, name)) for name in one._fields):
@@ -140,8 +144,13 @@ def _plain(case: Case) -> Case:
 
 
 def _differ(name: str, one: Any, other: Any) -> bool:
-    """Whether two arrays of a scene differ in what does not follow from names, or in how many numbers they have."""
-    return one.shape != other.shape or (name not in BALANCE and not np.array_equal(one, other))
+    """Whether two arrays of a scene differ in what does not follow from names, or in how many numbers they have.
+
+    Axes of an inertia that is scaled as a whole are the same but for rounding.
+    """
+    if one.shape != other.shape or name in BALANCE:
+        return bool(one.shape != other.shape)
+    return bool(np.abs(one - other).max(initial=0.0) > ROUNDED * np.abs(one).max(initial=0.0))
 
 
 def _refuse(case: Case, word: str, message: str) -> None:

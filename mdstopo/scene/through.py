@@ -21,7 +21,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.following import expressions_of
 from mdstopo.case.model import Case, Following, MovablePoints, Variable, VolumeRow
 from mdstopo.case.movable import placed
-from mdstopo.case.reader import read_case
+from mdstopo.case.reader import Document
 from mdstopo.case.words import number_text
 
 #: what places of points do not depend on, and what masses, loads and velocities do not
@@ -135,6 +135,7 @@ class _Points:
         self._numbers = stated.follows.of_kind("points")
         self._expressions = expressions_of(stated.follows, self._numbers)
         self._grids = tuple(dict.fromkeys(each.grid for each in self._numbers))
+        self._there = CasesWith(stated, self._numbers, _BESIDE_POINTS) if self._grids else None
         named = [each for each in stated.variables if each.defined]
         self._least = np.array([SHIFT * (each.upper - each.lower) for each in named])
         #: the names that places of points depend on
@@ -176,17 +177,22 @@ class _Points:
 
     def _read(self, values: FloatArray) -> FloatArray:
         """(C,) the coordinates with other numbers (K,) in the place of the expressions."""
-        points = case_with(self._stated, self._numbers, values, _BESIDE_POINTS).points
+        assert self._there is not None
+        points = self._there.at(values).points
         return np.concatenate([points[grid].local.ravel(order="F") for grid in self._grids])
 
 
-def case_with(case: Case, numbers: Sequence[Following], values: FloatArray, without: tuple[str, ...] = ()) -> Case:
-    """The case read once more with other values (K,) of numbers that follow from names, without some sections.
+class CasesWith:
+    """A case at other values of numbers that follow from names, without some sections."""
 
-    Raises CaseError where they are no case.
-    """
-    given = {each.key: float(value) for each, value in zip(numbers, values, strict=True)}
-    return read_case(case.text, path=case.path, overrides=case.overrides, without=without, at=given)
+    def __init__(self, case: Case, numbers: Sequence[Following], without: tuple[str, ...] = ()) -> None:
+        self._document = Document(case.text, path=case.path, overrides=case.overrides)
+        self._keys = [each.key for each in numbers]
+        self._without = without
+
+    def at(self, values: FloatArray) -> Case:
+        """The case with values (K,) of the numbers. Raises CaseError where they are no case."""
+        return self._document.case(self._without, dict(zip(self._keys, values.tolist(), strict=True)))
 
 
 def refuse_bounds(case: Case) -> None:
@@ -196,6 +202,7 @@ def refuse_bounds(case: Case) -> None:
     if not numbers:
         return
     expressions = expressions_of(case.follows, numbers)
+    there = CasesWith(case, numbers, _BESIDE_POINTS)
     named = [each for each in case.variables if each.defined]
     bounds = np.array([[each.lower, each.upper] for each in named]).T
     start = np.array([float(np.asarray(each.initial)) for each in named])
@@ -204,10 +211,10 @@ def refuse_bounds(case: Case) -> None:
         corners += [(each, np.where(np.arange(len(named)) == v, row, start)) for row in bounds]
     for variable, x in corners:
         try:
-            case_with(case, numbers, expressions.values(x), _BESIDE_POINTS)
+            there.at(expressions.values(x))
         except CaseError as error:
-            there = ", ".join(f"{each.defined} = {number_text(value)}" for each, value in zip(named, x, strict=True))
-            words = f"within the bounds, at {there}: {error.mistakes[0].path_key}: {error.mistakes[0].message}"
+            where = ", ".join(f"{each.defined} = {number_text(value)}" for each, value in zip(named, x, strict=True))
+            words = f"within the bounds, at {where}: {error.mistakes[0].path_key}: {error.mistakes[0].message}"
             mistake = case.marks.mistake(f"design.variables.{variable.name}", words)
             raise CaseError([mistake], str(case.path or case.name)) from None
 
