@@ -119,7 +119,7 @@ def refuse_other_places(case: Case, compiled: Callable[[Case, LoadCase], General
     for key in ("settle", "assemble"):
         if getattr(case.solver, key):
             _refuse(case, expressions.depends(0)[0], f"{follows.numbers[0].key}, which does not go with solver.{key}")
-    cases = CasesWith(case, follows.numbers)
+    cases = CasesWith(case, follows.numbers, ("uncertainty", "fit"))
     before = {each.name: compiled(_plain(case), each) for each in case.load_cases}
 
     def moves_more(which: IndexArray) -> bool:

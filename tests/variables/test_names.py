@@ -12,6 +12,10 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
+from mdstopo.finalize.finalize_design import finalize, opened, ready
+from mdstopo.robust.ensemble import Ensemble
+from mdstopo.robust.points import case_at
+from mdstopo.robust.sample import design_sample
 from mdstopo.session.run_session import run_session
 from mdstopo.store.result_reader import read_result
 from tests.variables.support import OBJECTIVES, differences, whole, whole_and_resumed, widths
@@ -236,3 +240,60 @@ def test_names_may_be_all_that_is_designed() -> None:
     assert case.n_design == 0
     outcome = run_session(case)
     assert outcome.objectives["X"] < mdstopo.evaluate(case, gradient=False).objectives["X"]
+
+
+FINAL = (
+    SPRINGS.replace("VARIABLES", "k: {of: define.k, lower: 10, upper: 100, cost: 0.01}").split("objectives:")[0]
+    + """
+objectives: {X: {response: {displacement: {body: m, at: [0.1, 0.1]}}, over_time: max}}
+constraints: [{volume: all, limit: 1.2}]
+optimizer: {max_iterations: 6}
+"""
+)
+
+
+def test_a_final_case_has_the_name_as_one_number(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    case = read_case(FINAL, path=tmp_path / "springs.yaml")
+    (tmp_path / "springs.yaml").write_text(FINAL)
+    outcome = run_session(case, path=tmp_path / "springs.h5")
+    opened_case, design = opened(read_result(tmp_path / "springs.h5"), {})
+    assert (opened_case.variables, opened_case.follows, len(design)) == ((), None, 1)
+    kept, reduced = ready(opened_case, design, 1, None)
+    done = finalize(opened_case, design, kept, reduced, place=tmp_path / "final.yaml")
+    k = float(outcome.variables["k"][0])
+    final = read_case(done.text)
+    assert f"define: {{k: {k!r}}}" in done.text
+    assert '"=k^2/50"' in done.text
+    laws = {group.name: group.laws[0] for group in final.members}
+    assert laws["t"].stiffness == pytest.approx(k**2 / 50.0, rel=1e-14)  # type: ignore[attr-defined]
+    assert laws["s_0"].stiffness == pytest.approx(0.7 * k * done.alpha[0], rel=1e-14)  # type: ignore[attr-defined]
+    assert laws["s_0"].free_length == pytest.approx(0.5 + k / 200.0, rel=1e-14)  # type: ignore[attr-defined]
+    (row,) = final.constraints
+    assert row.bound == pytest.approx(1.2 - 0.01 * k)
+    assert done.difference is not None
+    assert done.difference < 1e-9
+    harder = read_case(done.text, overrides={"define.k": 1.1 * k})
+    assert harder.members[0].laws[0].stiffness == pytest.approx(1.1 * 0.7 * k * done.alpha[0])  # type: ignore[attr-defined]
+
+
+def test_other_names_in_the_same_expressions_may_be_uncertain() -> None:
+    text = (
+        SPRINGS.replace("VARIABLES", "k: {of: define.k, lower: 10, upper: 100}").split("objectives:")[0]
+        + """
+objectives: {X: {response: {displacement: {body: m, at: [0.1, 0.1]}}, over_time: max}}
+uncertainty: {sample: 3, validation: 0, parameters: {define.f: {uniform: {from: 0.5, to: 1.5}}}}
+"""
+    )
+    text = text.replace("define: {k: 60}", "define: {k: 60, f: 1}").replace('"=k^2/50"', '"=f*k^2/50"')
+    case = read_case(text)
+    assert case.uncertainty is not None
+    sample = design_sample(case.uncertainty)
+    slopes = []
+    for i in range(3):
+        there = case_at(case, sample, i)
+        assert there.follows is not None
+        slopes.append(Evaluator(there).evaluate(there.start).variable_gradients["X"]["k"][0])
+    assert len(set(slopes)) == 3
+    ensemble = Ensemble(case)
+    found = ensemble.evaluate(case.start)
+    np.testing.assert_allclose(found.variable_gradients["X"]["k"][0], np.mean(slopes), rtol=1e-12)
