@@ -120,7 +120,9 @@ def refuse_other_places(case: Case, compiled: Callable[[Case, LoadCase], General
         if getattr(case.solver, key):
             _refuse(case, expressions.depends(0)[0], f"{follows.numbers[0].key}, which does not go with solver.{key}")
     cases = CasesWith(case, follows.numbers, ("uncertainty", "fit"))
-    before = {each.name: compiled(_plain(case), each) for each in case.load_cases}
+    # read anew, too: the case may have its points where a design has them
+    plain = _plain(cases.at(values))
+    before = {each.name: compiled(plain, each) for each in plain.load_cases}
 
     def moves_more(which: IndexArray) -> bool:
         shifted = values.copy()

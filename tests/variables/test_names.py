@@ -16,6 +16,7 @@ from mdstopo.finalize.finalize_design import finalize, opened, ready
 from mdstopo.robust.ensemble import Ensemble
 from mdstopo.robust.points import case_at
 from mdstopo.robust.sample import design_sample
+from mdstopo.scene.through import as_designed
 from mdstopo.session.run_session import run_session
 from mdstopo.store.result_reader import read_result
 from tests.variables.support import OBJECTIVES, differences, whole, whole_and_resumed, widths
@@ -297,3 +298,15 @@ uncertainty: {sample: 3, validation: 0, parameters: {define.f: {uniform: {from: 
     ensemble = Ensemble(case)
     found = ensemble.evaluate(case.start)
     np.testing.assert_allclose(found.variable_gradients["X"]["k"][0], np.mean(slopes), rtol=1e-12)
+
+
+def test_the_case_with_its_points_where_a_design_has_them_is_the_same_case() -> None:
+    case = case_of(SCENE, tolerance=1e-10)
+    design = case.start.copy()
+    design[case.n_design :] += [7.0, 0.2, -0.3, 0.1, 0.15]
+    there = as_designed(case, design)
+    assert not np.array_equal(there.points["p"].local, case.points["p"].local)
+    alpha, values = design[: case.n_design], case.space.named(design)
+    found, expected = mdstopo.evaluate(there, alpha), mdstopo.evaluate(case, alpha, variables=values)
+    np.testing.assert_allclose(list(found.objectives.values()), list(expected.objectives.values()), rtol=1e-12)
+    np.testing.assert_allclose(found.constraints, expected.constraints, rtol=1e-12)
