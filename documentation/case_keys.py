@@ -229,7 +229,8 @@ def _simple(kind: Kind) -> str:
         Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
         MeshFile: "path of an STL or OBJ file", MeshFaces: "path of an STL or OBJ file", Anything: "any value",
         Definitions: "`{name: number or expression, ...}`", SvgPath: "text of a path",
-        DefinedName: "`define.name`", FormulaText: "an [expression](expressions.md)", Parameters: "`{name: number, ...}`",
+        DefinedName: "`define.name`",
+        FormulaText: "an [expression](expressions.md)", Parameters: "`{name: number, ...}`",
     }  # fmt: skip
     return texts[type(kind)]
 

@@ -24,10 +24,12 @@ from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.through import BESIDE_SCENE, CasesWith
 
 #: the arrays of a scene that may follow from names, besides places of members and numbers of laws
-BALANCE = ("mass", "v0", "force", "load_arm", "load_force", "steady")
+BALANCE = ("mass", "v0", "force", "load_body", "load_follows", "load_arm", "load_force", "steady")
 #: how far names are shifted, relative to their size, and how large they are at least, as a share of their range
 SHIFT, LEAST = 1e-4, 3e-3
-#: what arrays that are the same may differ by, relative to their largest number
+#: arrays that are seen from the principal axes of bodies. Those of an inertia that is scaled as a whole stay, but for
+#: rounding, relative to the largest number
+TURNED = ("home", "member", "joint_par", "response_par", "contact", "bushing")
 ROUNDED = 1e-11
 ALLOWED = "masses, inertias, gravity, loads over given times, and velocities at the start"
 
@@ -116,6 +118,7 @@ def refuse_other_places(case: Case, compiled: Callable[[Case, LoadCase], General
     expressions = expressions_of(follows, follows.numbers)
     start = np.array([float(np.asarray(each.initial)) for each in names_of(case)])
     values = expressions.values(start)
+    asked = [name for name in GeneralModel._fields if name not in BALANCE]
     for key in ("settle", "assemble"):
         if getattr(case.solver, key):
             _refuse(case, expressions.depends(0)[0], f"{follows.numbers[0].key}, which does not go with solver.{key}")
@@ -128,9 +131,10 @@ def refuse_other_places(case: Case, compiled: Callable[[Case, LoadCase], General
         shifted = values.copy()
         shifted[which] += SHIFT * np.where(values[which] == 0.0, 1.0, np.abs(values[which]))
         there = _plain(cases.at(shifted))
+        turned = TURNED if all(".inertia" in follows.numbers[k].key for k in which.tolist()) else ()
         for load_case in there.load_cases:
             one, other = before[load_case.name], compiled(there, load_case)
-            if any(_differ(name, getattr(one, name), getattr(other, name)) for name in one._fields):
+            if any(_differ(getattr(one, name), getattr(other, name), name in turned) for name in asked):
                 return True
         return False
 
@@ -145,13 +149,10 @@ def _plain(case: Case) -> Case:
     return replace(case, variables=(), movable=(), follows=None)
 
 
-def _differ(name: str, one: Any, other: Any) -> bool:
-    """Whether two arrays of a scene differ in what does not follow from names, or in how many numbers they have.
-
-    Axes of an inertia that is scaled as a whole are the same but for rounding.
-    """
-    if one.shape != other.shape or name in BALANCE:
-        return bool(one.shape != other.shape)
+def _differ(one: Any, other: Any, turned: bool) -> bool:
+    """Whether two arrays of a scene differ; turned: by more than rounding has left of axes."""
+    if one.shape != other.shape or not turned:
+        return not np.array_equal(one, other)
     return bool(np.abs(one - other).max(initial=0.0) > ROUNDED * np.abs(one).max(initial=0.0))
 
 

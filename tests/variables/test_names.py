@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -169,6 +170,12 @@ def test_a_name_may_be_used_in_the_loads_of_two_load_cases() -> None:
     check(case_of(text, tolerance=1e-11), 1e-6)
 
 
+def test_a_load_that_is_zero_where_a_name_begins_is_differentiated_all_the_same() -> None:
+    text = SPRINGS.replace("VARIABLES", "k: {of: define.k, lower: 10, upper: 100}")
+    text += 'loads: [{body: m, at: [0.1, "=k/60 - 1"], force: ["=k/20 - 3", 1]}]\n'
+    check(case_of(text, tolerance=1e-11), 1e-6)
+
+
 def test_names_vary_with_fixed_steps_too() -> None:
     text = SPRINGS.replace(
         "VARIABLES", "k: {of: define.k, lower: 10, upper: 100}, h: {of: define.h, lower: 1, upper: 4}"
@@ -189,6 +196,13 @@ def test_what_else_a_scene_would_move_by_is_refused_with_its_key() -> None:
     assert mistake.message.startswith(
         "from define.k follows bodies.m.position[0], which changes more of the scene than"
     )
+    for load, key in (
+        ("force: {formula: ['a*sin(9*t)', '0'], parameters: {a: '=k'}}", "loads[0].force.parameters.a"),
+        ("force: {table: [[0, 0, 0], ['=k/200', 1, 0]]}", "loads[0].force.table[1][0]"),
+    ):
+        timed = SPRINGS.replace("VARIABLES", "k: {of: define.k, lower: 10, upper: 100}")
+        with pytest.raises(CaseError, match=re.escape(f"from define.k follows {key}, which changes more")):
+            Evaluator(read_case(timed + f"loads: [{{body: m, {load}}}]\n"))
     light = SPRINGS.replace("VARIABLES", "k: {of: define.k, lower: 10, upper: 100}").replace("mass: 2", 'mass: "=k-20"')
     with pytest.raises(CaseError) as caught:
         Evaluator(read_case(light))
