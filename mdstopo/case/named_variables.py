@@ -134,6 +134,26 @@ def what_follows(written: Node) -> tuple[list[str], dict[str, float | str]]:
     return keys, {word: every[word] for word in every if word in (*words, *expressions.used)}
 
 
+def laws_that_follow(written: Node, words: Sequence[str]) -> tuple[Expressions, list[tuple[str, int, str]], list[str]]:
+    """Numbers of laws as functions of some defined names: their expressions, and group, place and parameter, and key
+    path of each.
+
+    written: a case that has been read, with its expressions.
+    """
+    places = [each for each in _expressions(written, (), "") if each.steps[0] == "members" and "law" in each.steps[2:3]]
+    every = {word: stated for word, stated in _given(written, ()).items() if word not in words}
+    expressions = Expressions(words, every, [each.text for each in places])
+    found = [(str(each.steps[1]), *_law_and_parameter(each)) for each in places]
+    return expressions, found, [each.key for each in places]
+
+
+def _law_and_parameter(place: _Written) -> tuple[int, str]:
+    """Of a number of a law its place in the group's list of laws, and which number it is; nothing where it is none."""
+    rest = [step for step in place.steps[3:] if step != "parameters"]
+    law = int(rest.pop(0)) if rest and isinstance(rest[0], int) else 0
+    return law, str(rest[0]) if len(rest) == 1 else ""
+
+
 def _of(variable: Variable) -> str:
     return f"{inside('design.variables', variable.name)}.of"
 
@@ -214,13 +234,11 @@ class _Asked:
     def _of_law(self, place: _Written) -> Following | str:
         """A number of a law, or why it cannot follow."""
         group = self._groups[str(place.steps[1])]
-        rest = [step for step in place.steps[3:] if step != "parameters"]
-        law = int(rest.pop(0)) if rest and isinstance(rest[0], int) else 0
+        law, parameter = _law_and_parameter(place)
         record = group.laws[law]
         can = with_role(type(record), "varies")
-        if len(rest) != 1 or rest[0] not in can:
+        if parameter not in can:
             return f"by which no law of the type {record.type} is differentiated; there can be {listed(can)}"
-        parameter = str(rest[0])
         other = self._taken.get((group.name, law, parameter))
         if other is not None:
             return f"but {shown(other)} varies it already"

@@ -116,6 +116,11 @@ class Document:
         if expressions or SECTION in root.entries:
             self._root = with_numbers(self._written, reading)
 
+    @property
+    def written(self) -> Node:
+        """The whole document with its expressions."""
+        return self._written
+
     def case(self, without: tuple[str, ...] = (), at: Mapping[str, float] | None = None) -> Case:
         """The case; without: sections that are not read. at: by key path, numbers in the place of what stands there.
 
