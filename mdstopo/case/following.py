@@ -7,6 +7,7 @@ so they are exact; where an expression has a kink, they are those of the side on
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -64,9 +65,13 @@ class Expressions:
 
     def slopes(self, x: FloatArray) -> FloatArray:
         """(K, V) their derivatives by the names at x."""
-        slopes = [derivative(root, word) for root in self.roots for word in self.names]
-        found = values_of(dict(zip(self.names, x.tolist(), strict=True)), slopes)
+        found = values_of(dict(zip(self.names, x.tolist(), strict=True)), self._derivatives)
         return np.array(found).reshape(len(self.roots), len(self.names))
+
+    @cached_property
+    def _derivatives(self) -> list[Expression]:
+        """Of each expression that by each name."""
+        return [derivative(root, word) for root in self.roots for word in self.names]
 
     def depends(self, k: int) -> list[str]:
         """The names that expression k depends on."""
