@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mdstopo.case.definitions import Definitions
+from mdstopo.case.definitions import DefinedName, Definitions
 from mdstopo.case.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.kinds import NUMBER, Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
 from mdstopo.case.laws.expression import Parameters
@@ -229,6 +229,7 @@ def _simple(kind: Kind) -> str:
         Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
         MeshFile: "path of an STL or OBJ file", MeshFaces: "path of an STL or OBJ file", Anything: "any value",
         Definitions: "`{name: number or expression, ...}`", SvgPath: "text of a path",
+        DefinedName: "`define.name`",
         FormulaText: "an [expression](expressions.md)", Parameters: "`{name: number, ...}`",
     }  # fmt: skip
     return texts[type(kind)]

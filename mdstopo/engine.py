@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
+    from mdstopo.scene.through import Through
     from mdstopo.sensitivity.candidate_pass import CandidatePass
 
 #: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
@@ -77,13 +78,16 @@ class Evaluator:
         self._may_be_coarse = case.solver.step is not None and kind.finds_step
         self._compiles_beside = beside
         self._beside = Beside(kind.name, share) if beside and not self.beyond else None
+        self._through = _through(case)
+        #: the case whose variables scenes know
+        own = case if self._through is None else self._through.case
         #: what the scenes' coordinates are measured from, and the case in these
         self._origin = origin_of(case)
-        self._near = seen_from(case, self._origin)
+        self._near = seen_from(own, self._origin)
         if sample:
             from mdstopo.scene.rounding import rounded_otherwise
 
-            self._near = rounded_otherwise(case, self._origin, extent_of(case), sample)
+            self._near = rounded_otherwise(own, self._origin, extent_of(case), sample)
         self._family = _family(self.beyond)
         self.scenes: Mapping[str, Scene] = self._family.scenes(self._near)
         self._drivers: dict[str, SceneDriver] = {}
@@ -162,15 +166,19 @@ class Evaluator:
         if method == "iterative" and self._gives_way:
             return self.otherwise(sensitivity="iterative").evaluate(alpha, gradient, method, rows)
         seen = self._seen  # first: a driver that is made may simulate a design of its own
-        design = self._design.take(alpha)
-        edge = self._without_slope(design) if gradient and self._rooted else ""
+        stated = self._design.take(alpha)
+        design, through = self.computed(stated), self._through
+        edge = self._without_slope(stated, gradient)
+        nowhere = "" if through is None else through.trouble(False)
         gradient = gradient and not edge
         exact = gradient and method == "adjoint"
         status, message, grazing = Status.OK, "", ""
         looked: dict[str, tuple[Peak, ...]] = {}
         work: list[list[int]] = []
-        begun = self._side_by_side(design, exact, rows)
-        for name, keys, driver in seen:
+        begun = {} if nowhere else self._side_by_side(design, exact, rows)
+        if nowhere:
+            status, message = Status.NON_FINITE, nowhere
+        for name, keys, driver in () if nowhere else seen:
             too_coarse = self._coarse_step(name, design)
             if too_coarse:
                 status, message = Status.STEP_TOO_LARGE, too_coarse
@@ -189,6 +197,8 @@ class Evaluator:
                 break
             if result.grazing >= 0:
                 grazing = driver.member(result.grazing)
+            if through is not None:
+                gradients, across = (None if each is None else through.pull(each) for each in (gradients, across))
             for j, key in enumerate(keys):
                 looked[key] = _peaks(result, j, gradients, across, driver.shapes[j])
         if edge and status.ok:
@@ -272,7 +282,7 @@ class Evaluator:
 
     def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
         """The motion of one load case with the design alpha (N,)."""
-        design = self.design(alpha)
+        design = self.computed(self.design(alpha))
         driver = self.driver(load_case)
         too_coarse = self._coarse_step(load_case, design)
         status, steps = driver.simulate(design)
@@ -304,7 +314,9 @@ class Evaluator:
 
     def _histories(self, design: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         load_case = next(each.load_case for each in self.case.objectives if each.name == objective)
-        return self.driver(load_case).histories(design, list(self._by_load_case[load_case]).index(objective))
+        place = list(self._by_load_case[load_case]).index(objective)
+        status, t, lines = self.driver(load_case).histories(self.computed(design), place)
+        return status, t, lines if self._through is None else self._through.pull(lines)
 
     def problem(self, scalarisation: "Scalarisation | None" = None) -> "Problem":
         """The case as the optimiser sees it; several objectives need a scalarisation."""
@@ -325,7 +337,7 @@ class Evaluator:
 
     def settled(self, alpha: FloatArray, load_case: str) -> Settled | None:
         """How far the start moves to be at rest with alpha (N,); None where the case does not settle, or cannot."""
-        return self.driver(load_case).settled(self.design(alpha)) if self.case.solver.settle else None
+        return self.driver(load_case).settled(self.computed(self.design(alpha))) if self.case.solver.settle else None
 
     def degrees_of_freedom(self, load_case: str) -> int:
         """Coordinates that are free, less the independent rows of joints."""
@@ -337,7 +349,7 @@ class Evaluator:
 
     def start_modes(self, alpha: FloatArray, load_case: str) -> Modes:
         """Small motion about the start; freedoms are those of `scenes[load_case].bodies`, in their order."""
-        return self.driver(load_case).start_modes(self.design(alpha))
+        return self.driver(load_case).start_modes(self.computed(self.design(alpha)))
 
     # -- how
 
@@ -345,13 +357,22 @@ class Evaluator:
         """alpha as (N,) float64, with the values of variables (P,) behind it; ValueError where it is no design."""
         return checked(self.case, alpha)
 
+    def computed(self, design: FloatArray) -> FloatArray:
+        """The design that scenes have in the place of one of the case (N + P,): what follows from defined names."""
+        return design if self._through is None else self._through.design(design)
+
     @cached_property
     def _seen(self) -> list[tuple[str, tuple[str, ...], SceneDriver]]:
         """The load cases that objectives or constraints look at: name, the names of these, driver."""
         return [(name, tuple(looked), self.driver(name)) for name, looked in self._by_load_case.items() if looked]
 
-    def _without_slope(self, design: FloatArray) -> str:
-        """Why there is no gradient at this design, or nothing: alpha^mu has no slope at 0 where mu < 1."""
+    def _without_slope(self, design: FloatArray, gradient: bool) -> str:
+        """Why a gradient that is wanted is not there at this design, or nothing: alpha^mu has no slope at 0 where
+        mu < 1, and what follows from defined names may have none."""
+        if not gradient:
+            return ""
+        if self._through is not None and (infinite := self._through.trouble(True)):
+            return infinite
         for name, power, part in self._rooted:
             if np.any(design[part] == 0.0):
                 return f"alpha = 0 in group {name}, whose power {power:g} is below 1"
@@ -374,7 +395,7 @@ class Evaluator:
             load_case: self._made(load_case, explicit) for load_case, looked in self._by_load_case.items() if looked
         }
         for driver in drivers.values():
-            held = held_short(cast("GeneralDriver", driver), self._design.take(self.case.start))
+            held = held_short(cast("GeneralDriver", driver), self.computed(self._design.take(self.case.start)))
             if held:
                 return STIFF, held
         self._drivers.update(drivers)
@@ -397,7 +418,7 @@ class Evaluator:
         if method.kind.finds_step and solver.step is None:
             from mdstopo.integrators.default_step import default_step
 
-            driver.settings[2] = default_step(driver, self.case.start)
+            driver.settings[2] = default_step(driver, self._near.start)
         return driver
 
     def _coarse_step(self, name: str, design: FloatArray) -> str:
@@ -467,6 +488,16 @@ class Evaluator:
             variable_gradients={name: named(slope) for name, slope in found.gradients.items()},
             constraint_variable_gradients=named(found.constraint_gradients),
         )
+
+
+def _through(case: Case) -> "Through | None":
+    """How defined names that are design variables reach the scenes, where the case has such."""
+    if case.follows is None:
+        return None
+    from mdstopo.scene.through import Through, refuse_bounds
+
+    refuse_bounds(case)
+    return Through(case)
 
 
 def _total(counts: list[list[int]]) -> list[int]:

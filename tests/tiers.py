@@ -113,6 +113,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "space/test_half_turns_looked_at.py": ("without_an_error_estimate",),
     "space/test_implicit_steps.py": ("",),
     "space/test_law_parameters.py": ("",),
+    "space/test_names_in_space.py": ("",),
     "space/test_windows.py": ("",),
     "stress/test_stress.py": ("alpha", "periods-", "turns-wheel", "turns-driven", "-slow-"),
     "variables/test_crush.py": (

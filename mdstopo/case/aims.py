@@ -61,12 +61,14 @@ class Objective(Value):
 
 @frozen
 class Variable(Value):
-    """A parameter of laws that the optimiser varies, or a coordinate of points.
+    """A parameter of laws that the optimiser varies, a coordinate of points, or a defined name.
 
-    groups: whose; laws: in each of them the place of the law. each: group | member | point; count: how many values it
-    has, one or as many as a group has members or a grid points. initial, lower, upper in the parameter's unit; initial
-    of points is an array (count,). cost: what one unit of each value adds to volume rows that cover any of the groups.
-    points: the grid whose points' coordinates along one axis the values are; empty for a parameter.
+    groups: whose; laws: in each of them the place of the law. each: group | member | point | case; count: how many
+    values it has, one or as many as a group has members or a grid points. initial, lower, upper in the parameter's
+    unit; initial of points is an array (count,). cost: what one unit of each value adds to volume rows that cover any
+    of the groups. points: the grid whose points' coordinates along one axis the values are; empty for a parameter.
+    defined: the name in `define` whose number it is, which has no groups and laws of its own; reached: the groups in
+    which something follows from it, moved: the grids of points whose places do.
     """
 
     name: str
@@ -81,6 +83,9 @@ class Variable(Value):
     cost: float = 0.0
     unit: str = ""
     points: str = ""
+    defined: str = ""
+    reached: tuple[str, ...] = ()
+    moved: tuple[str, ...] = ()
 
     @property
     def initials(self) -> FloatArray:
@@ -90,7 +95,44 @@ class Variable(Value):
     @property
     def of(self) -> str:
         """What varies, in words."""
+        if self.defined:
+            return f"define.{self.defined}"
         return f"points {self.points}" if self.points else f"{self.parameter} of {', '.join(self.groups)}"
+
+
+@frozen
+class Following(Value):
+    """A number of the case that is an expression of defined names which are design variables.
+
+    key: its key path; expression: as written. kind: law, a number of a law; points, of the places of points; scene, of
+    masses, loads and velocities. group, law, parameter: of a law the group, its place there, and which number of it.
+    grid: of points their name.
+    """
+
+    key: str
+    expression: str
+    kind: str
+    group: str = ""
+    law: int = 0
+    parameter: str = ""
+    grid: str = ""
+
+
+@frozen
+class Follows(Value):
+    """What follows from defined names that are design variables.
+
+    names: these, in the order of the variables. numbers: what follows from any of them, in the case's order. given:
+    all other defined names that expressions of the numbers lead to, each a number or an expression.
+    """
+
+    names: tuple[str, ...]
+    numbers: tuple[Following, ...]
+    given: Mapping[str, float | str] = field(default_factory=FrozenDict)
+
+    def of_kind(self, kind: str) -> tuple[Following, ...]:
+        """The numbers of one kind."""
+        return tuple(each for each in self.numbers if each.kind == kind)
 
 
 @frozen

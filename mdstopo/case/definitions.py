@@ -7,7 +7,8 @@ all of these become numbers before anything else is read, so that no kind of val
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
+from pathlib import Path
 from typing import Any
 
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
@@ -62,10 +63,71 @@ class Definitions(Value):
         return {"type": "object", "propertyNames": names, "additionalProperties": {"type": ["number", "string"]}}
 
 
-def with_numbers(root: Node, reading: Reading) -> Node:
-    """The tree with a number in the place of each expression; mistakes are noted where they stand."""
+@frozen
+class DefinedName(Value):
+    """The key path of a defined name, `define.k`."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """The name behind `define.`, or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        section, _, word = value.partition(".") if isinstance(value, str) else ("", "", "")
+        if section != SECTION or not word:
+            reading.mistake(path, f"found {found(node)}, allowed is a name in `define`, as in define.k", node)
+            return BAD
+        return word
+
+    def schema(self) -> dict[str, Any]:
+        """string."""
+        return {"type": "string", "pattern": f"^{SECTION}\\.{WORD.pattern}$"}
+
+
+DEFINED_NAME = DefinedName()
+
+
+def beginning(root: Node) -> Node:
+    """The tree in which defined names that are design variables are the `initial` values of these, where stated."""
+    defined, design = (_entries(root, key) for key in (SECTION, "design"))
+    variables = _entries(design["variables"][1], "") if "variables" in design else {}
+    begun: dict[str, Node] = {}
+    for _, variable in variables.values():
+        stated = {key: value for key, (_, value) in variable.entries.items()}
+        word = DEFINED_NAME.read(stated["of"], "", Reading(Path())) if "of" in stated else BAD
+        initial = stated.get("initial")
+        if word is not BAD and word in defined and initial is not None and _is_number(initial):
+            begun[word] = initial
+    if not begun:
+        return root
+    section = root.entries[SECTION]
+    twin, names = root.at(root.line, root.column), section[1].at(section[1].line, section[1].column)
+    names.entries = {word: (key, begun.get(word, value)) for word, (key, value) in defined.items()}
+    twin.entries = {**root.entries, SECTION: (section[0], names)}
+    return twin
+
+
+def _entries(node: Node, key: str) -> dict[str, tuple[Node, Node]]:
+    """The entries of a mapping at a key of a node (empty: the node itself); none where none is there."""
+    if key:
+        if node.kind != MAPPING or key not in node.entries:
+            return {}
+        node = node.entries[key][1]
+    return node.entries if node.kind == MAPPING else {}
+
+
+def _is_number(node: Node) -> bool:
+    """Whether a node is a number, or an expression."""
+    value = node.scalar() if node.kind == SCALAR else None
+    if isinstance(value, str):
+        return value.lstrip().startswith(MARK)
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def with_numbers(root: Node, reading: Reading, kept: Container[str] = ()) -> Node:
+    """The tree with a number in the place of each expression; mistakes are noted where they stand.
+
+    kept: key paths of expressions that stay as they are.
+    """
     names = _Names(root, reading)
-    return _Numbers(names.values(), names.failed, reading).tree(root, "")
+    return _Numbers(names.values(), names.failed, reading, kept).tree(root, "")
 
 
 def formula_in(node: Node, path: str, names: Any, reading: Reading) -> Formula | None:
@@ -153,8 +215,9 @@ class _Names:
 class _Numbers:
     """The tree on its way to numbers; parts that aliases share stay shared."""
 
-    def __init__(self, values: Mapping[str, float], failed: set[str], reading: Reading) -> None:
+    def __init__(self, values: Mapping[str, float], failed: set[str], reading: Reading, kept: Container[str]) -> None:
         self.values = values
+        self.kept = kept
         self.names = [*values, *failed]
         self.failed = failed
         self.reading = reading
@@ -169,9 +232,11 @@ class _Numbers:
 
     def _tree(self, node: Node, path: str) -> Node:
         if node.kind == SCALAR:
+            if path in self.kept:
+                return node
             is_text = node.text.lstrip().startswith(MARK) or path.startswith(f"{SECTION}.")
             return self._number(node, path) if is_text and isinstance(node.scalar(), str) else node
-        if _is_text(path):
+        if is_kept_as_text(path):
             return node
         if node.kind == SEQUENCE:
             items = [self.tree(item, f"{path}[{index}]") for index, item in enumerate(node.items)]
@@ -216,6 +281,6 @@ def _with_number(node: Node, value: float) -> Node:
     return twin
 
 
-def _is_text(path: str) -> bool:
+def is_kept_as_text(path: str) -> bool:
     """Whether expressions stay as they are: what scenarios set is read again for each of them."""
     return path.startswith("uncertainty.scenarios.") and path.endswith(".set") and path.count(".") == 3

@@ -1,4 +1,4 @@
-"""What varies besides each member's own alpha: alphas that are one, and parameters of laws (`design_space`)."""
+"""What varies besides each member's own alpha: alphas that are one, parameters of laws, names (`design_space`)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import Number
 from mdstopo.case.laws.law import with_role
-from mdstopo.case.model import Law, MemberGroup, Variable
+from mdstopo.case.model import Follows, Law, MemberGroup, Variable
+from mdstopo.case.nodes import Node
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.words import inside, listed, number_text, shown
 
@@ -66,19 +67,29 @@ def _are_design(names: list[str], path: str, groups: dict[str, MemberGroup], rea
     return good
 
 
-def build_variables(top: Fields, groups: dict[str, MemberGroup] | None, reading: Reading) -> tuple[Variable, ...]:
-    """The variables that can be made, in the file's order."""
+def build_variables(
+    top: Fields, groups: dict[str, MemberGroup] | None, written: Node, reading: Reading
+) -> tuple[tuple[Variable, ...], Follows | None]:
+    """The variables that can be made, in the file's order, and what follows from those that are defined names.
+
+    written: the whole case with its expressions.
+    """
     design = top["design"]
     sections = design["variables"] if isinstance(design, Fields) else None
     if not isinstance(sections, dict) or groups is None:
-        return ()
+        return (), None
     built: list[Variable] = []
+    follows: Follows | None = None
     taken: dict[tuple[str, int, str], str] = {}
     for name, fields in sections.items():
         if fields is BAD or not fields.good():
             continue
-        variable = _build(name, fields, groups, reading)
+        variable = _build(name, fields, top, groups, reading)
         if variable is None:
+            continue
+        twin = next((each.name for each in built if each.defined and each.defined == variable.defined), None)
+        if twin is not None:
+            reading.mistake(inside(fields.path, "of"), f"define.{variable.defined} is varied by {shown(twin)} already")
             continue
         for group, law in zip(variable.groups, variable.laws, strict=True):
             other = taken.setdefault((group, law, variable.parameter), name)
@@ -86,14 +97,27 @@ def build_variables(top: Fields, groups: dict[str, MemberGroup] | None, reading:
                 message = f"{variable.parameter} of {group!r} is varied by {shown(other)} already"
                 reading.mistake(inside(fields.path, "parameter"), message)
         built.append(variable)
+    named = [each for each in built if each.defined]
+    if named:
+        from mdstopo.case.named_variables import build_follows  # most cases have none
+
+        found, follows = build_follows(named, written, top, groups, taken, reading)
+        by_name = {each.name: each for each in found}
+        built = [by_name.get(each.name, each) for each in built]
     if isinstance(top["objectives"], dict) and "variables" in top["objectives"]:
         message = "this name is taken where there are design.variables: results keep the derivatives by them under it"
         reading.mistake("objectives.variables", message)
-    return tuple(built)
+    return tuple(built), follows
 
 
-def _build(name: str, fields: Fields, groups: dict[str, MemberGroup], reading: Reading) -> Variable | None:
+def _build(name: str, fields: Fields, top: Fields, groups: dict[str, MemberGroup], reading: Reading) -> Variable | None:
+    if fields["of"] is not None:
+        from mdstopo.case.named_variables import build_named  # most cases have none
+
+        return build_named(name, fields, top, reading)
     stated = fields["group"]
+    if fields["parameter"] is None:
+        return None  # it is missing, which has been noted
     names = [stated] if isinstance(stated, str) else list(stated)
     if not all(group in groups for group in names):
         return None
@@ -182,5 +206,5 @@ def _within(fields: Fields, initial: float, field: Field[Any], reading: Reading)
 
 def prices(variables: tuple[Variable, ...], groups: tuple[str, ...]) -> FloatArray:
     """(P,) what the values of variables add to a volume row over some groups; none where there are no variables."""
-    pieces = [np.full(v.count, v.cost if set(v.groups) & set(groups) else 0.0) for v in variables]
+    pieces = [np.full(v.count, v.cost if {*v.groups, *v.reached} & set(groups) else 0.0) for v in variables]
     return np.concatenate(pieces) if pieces else np.zeros(0)

@@ -48,6 +48,9 @@ def _numbers(fields: Fields, root: Node, reading: Reading) -> list[FitNumber]:
             reading.mistake(here, f"found {found(node)} at {key}; what is estimated is one number")
         elif key in built:
             reading.mistake(here, f"{key} is estimated already")
+        elif key in reading.followed:
+            owner = reading.followed[key]
+            reading.mistake(here, f"{key} cannot be estimated: it follows from the design variable {owner}")
         elif keys is not BAD and keys.good():
             bounds = _estimate(keys, value, reading)
             if bounds is not None:

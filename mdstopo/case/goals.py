@@ -170,7 +170,7 @@ def build_constraints(
 
 def _lengths_vary(row: VolumeRow, groups: dict[str, MemberGroup] | None, variables: tuple[Variable, ...]) -> bool:
     """Whether members that a row sums up cost a length that varies: then what it comes to is not known here."""
-    moving = {each.points for each in variables if each.points}
+    moving = {each.points for each in variables if each.points}.union(*(each.moved for each in variables))
     return any(groups[name].cost_varies(moving) for name in row.groups if groups is not None and name in groups)
 
 
@@ -205,7 +205,7 @@ def _volume_row(
     named = [stated] if isinstance(stated, str) else stated
     good = sense is not None and not any(name is BAD for name in named)
     sections = top["members"] if isinstance(top["members"], dict) else {}
-    priced = {name: None for each in variables if each.cost > 0.0 for name in each.groups}
+    priced = {name: None for each in variables if each.cost > 0.0 for name in (*each.groups, *each.reached)}
     for index, name in enumerate(named):
         where = path if isinstance(stated, str) else f"{path}[{index}]"
         section = sections.get(name) if name is not BAD else None

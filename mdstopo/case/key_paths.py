@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
 
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
 from mdstopo.case.overrides import WrongPathError, steps_of
@@ -78,9 +78,7 @@ def stands(steps: Sequence[str], root: Node) -> bool:
 
 def varied_by(steps: list[str], root: Node) -> str:
     """Which design variable decides the parameter of a law that a key path leads to; nothing where none does."""
-    design = root.entries.get("design")
-    variables = design[1].entries.get("variables") if design is not None else None
-    for name, (_, node) in variables[1].entries.items() if variables is not None else ():
+    for name, node in _variables(root):
         stated = {key: value for key, (_, value) in node.entries.items()}
         if "group" not in stated or "parameter" not in stated or stated["parameter"].text != steps[-1]:
             continue
@@ -89,6 +87,28 @@ def varied_by(steps: list[str], root: Node) -> str:
         if steps[1] in groups and (len(steps) == 4 or place in ("", steps[3])):
             return f"it is the design variable {name}"
     return ""
+
+
+def varied_as(word: str, root: Node) -> str:
+    """Which design variable a defined name is; nothing where it is none."""
+    for name, node in _variables(root):
+        stated = node.entries.get("of")
+        if stated is not None and stated[1].text == f"define.{word}":
+            return f"it is the design variable {name}"
+    return ""
+
+
+def stated_variables(root: Node, key: str) -> list[Node]:
+    """The design variables of a case that state a key."""
+    return [node for _, node in _variables(root) if key in node.entries]
+
+
+def _variables(root: Node) -> Iterator[tuple[str, Node]]:
+    """The design variables of a case as they are stated, by name."""
+    design = root.entries.get("design")
+    variables = design[1].entries.get("variables") if design is not None else None
+    for name, (_, node) in variables[1].entries.items() if variables is not None else ():
+        yield name, node
 
 
 def why_fixed(steps: list[str], root: Node, sections: Container[str]) -> str:
@@ -101,6 +121,8 @@ def why_fixed(steps: list[str], root: Node, sections: Container[str]) -> str:
         return f"`{steps[2]}` decides {_OF_GROUPS[steps[2]]}"
     if section == "members" and len(steps) > 3 and steps[2] == "law":
         return varied_by(steps, root)
+    if section == "define" and len(steps) == 2:
+        return varied_as(steps[1], root)
     if section == "points" and "count" in steps:
         return "`count` decides which members there are"
     return f"`{section}` {SECTIONS[section]}" if section in sections else ""

@@ -14,6 +14,8 @@ import numpy as np
 
 from mdstopo.case.aims import (
     Combine,
+    Following,
+    Follows,
     Objective,
     OptimizerSettings,
     Response,
@@ -98,6 +100,8 @@ __all__ = [
     "Fit",
     "FixedJoint",
     "FloatArray",
+    "Following",
+    "Follows",
     "FrozenDict",
     "GapLaw",
     "IndexArray",
@@ -145,8 +149,9 @@ class Case(Value):
     text, sha256: the YAML as read and its hash; overrides: keys set from outside, key path -> value in YAML;
     files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
     the user should know. uncertainty: None where all is certain; the other fields are the nominal case. shared: groups
-    whose members have one alpha; mirrored: groups whose members k have one; variables: parameters of laws that are
-    varied, then coordinates of points; movable: the points whose these are. fit: what `mdstopo fit` estimates.
+    whose members have one alpha; mirrored: groups whose members k have one; variables: parameters of laws and defined
+    names that are varied, then coordinates of points; movable: the points whose these are; follows: what follows from
+    these names, None where no name is varied. fit: what `mdstopo fit` estimates.
     dimension: 2 in the plane; 3 in space, where bodies are `SpatialBody`, joints `SpatialJoint` and contacts
     `SurfaceContact`.
     """
@@ -179,6 +184,7 @@ class Case(Value):
     dimension: int = 2
     fit: Fit | None = None
     movable: tuple[MovablePoints, ...] = ()
+    follows: Follows | None = None
 
     def __repr__(self) -> str:
         parts = [counted(len(self.bodies), "body"), f"{counted(self.n_members, 'member')}, {self.n_design:,} designed"]

@@ -56,7 +56,7 @@ def build_movable(
         if region is None:
             continue
         values = _values(name, stated, region, path, reading)
-        if values is None or not _is_of_use(name, path, top, groups, reading):
+        if values is None or not is_of_use(name, path, top, groups, reading):
             continue
         body, base, axes = grid.body, region.base, region.axes
         if fields["frame"] == "global":
@@ -154,7 +154,7 @@ def _values(name: str, points: FloatArray, region: _Region, path: str, reading: 
     return None
 
 
-def _is_of_use(name: str, path: str, top: Fields, groups: dict[str, MemberGroup] | None, reading: Reading) -> bool:
+def is_of_use(name: str, path: str, top: Fields, groups: dict[str, MemberGroup] | None, reading: Reading) -> bool:
     """Whether members end at the points of a grid, and nothing that cannot follow them does; notes what does."""
     contacts = top["contacts"] if isinstance(top["contacts"], (list, tuple)) else ()
     touching = [i for i, each in enumerate(contacts) if each is not BAD and each["points"] == name]

@@ -14,7 +14,7 @@ from typing import Any
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.candidates import with_start_set
 from mdstopo.case.contacts import build_contacts
-from mdstopo.case.definitions import MARK, SECTION, with_numbers
+from mdstopo.case.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.extending import KEY, CannotExtendError, extended, text_of_tree
@@ -74,50 +74,89 @@ def read_case(
 ) -> Case:
     """The case in `text`; raises CaseError as `load_case`.
 
+    text: the case file.
     path: where the text comes from; included files are relative to it, else to the current folder.
-    sha256: of the file's bytes, where they are not the text in UTF-8. without: sections that are not read.
+    overrides: as of `load_case`.
+    sha256: of the file's bytes, where they are not the text in UTF-8.
+    without: sections that are not read.
     """
-    place = None if path is None else Path(path)
-    file = "<text>" if path is None else str(path)
-    reading = Reading(Path() if place is None else place.parent)
-    own = _parsed(text, reading, file)
-    try:
-        root = extended(own, place, reading)
-    except CannotExtendError:
-        raise CaseError(reading.mistakes, file) from None
-    whole_text = text if root is own else text_of_tree(root)
-    root, texts = apply_overrides(root, overrides or {}, reading.mistakes.append)
-    if KEY in root.entries:
-        reading.mistake(KEY, "can only be stated in the file", root.entries[KEY][1])
-    if MARK in whole_text or SECTION in root.entries or any(MARK in each for each in texts.values()):
-        root = with_numbers(root, reading)
-    if without:
-        whole, root = root, root.at(root.line, root.column)
-        root.entries = {key: entry for key, entry in whole.entries.items() if key not in without}
-    reading.mark("", root)
-    geometry = geometry_in(root, reading)
-    top = geometry.format.read(root, "", reading)
-    assert isinstance(top, Fields)
-    parts = _build(top, root, geometry, reading)
-    if top["uncertainty"] is not None:
-        from mdstopo.case.uncertainty import build_uncertainty  # most cases have none
+    return Document(text, path=path, overrides=overrides, sha256=sha256).case(without)
 
-        parts["uncertainty"] = build_uncertainty(top, parts["constraints"], root, reading)
-    if reading.mistakes:
-        raise CaseError(reading.mistakes, file)
-    case = Case(
-        title=top["title"],
-        path=place,
-        name="case" if place is None else place.stem,
-        text=whole_text,
-        sha256=sha256 or hashlib.sha256(text.encode()).hexdigest(),
-        overrides=FrozenDict(texts),
-        files=FrozenDict(reading.files),
-        marks=reading.marks(),
-        warnings=tuple(reading.warnings),
-        **parts,
-    )
-    return with_start_set(case) if case.priced_groups else case
+
+class Document:
+    """The text of a case file as a tree of numbers, from which the case is made, perhaps at other numbers.
+
+    text, path, overrides, sha256: as of `read_case`. Raises CaseError where it is no document.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        *,
+        path: str | os.PathLike[str] | None = None,
+        overrides: Mapping[str, Any] | None = None,
+        sha256: str | None = None,
+    ) -> None:
+        self._place = None if path is None else Path(path)
+        self._file = "<text>" if path is None else str(path)
+        self._sha256 = sha256 or hashlib.sha256(text.encode(errors="replace")).hexdigest()
+        reading = self._reading = Reading(Path() if self._place is None else self._place.parent)
+        own = _parsed(text, reading, self._file)
+        try:
+            root = extended(own, self._place, reading)
+        except CannotExtendError:
+            raise CaseError(reading.mistakes, self._file) from None
+        self._text = text if root is own else text_of_tree(root)
+        root, self._overrides = apply_overrides(root, overrides or {}, reading.mistakes.append)
+        if KEY in root.entries:
+            reading.mistake(KEY, "can only be stated in the file", root.entries[KEY][1])
+        #: with expressions, and with numbers in their places
+        self._written = self._root = beginning(root)
+        expressions = any(MARK in each for each in (self._text, *self._overrides.values()))
+        if expressions or SECTION in root.entries:
+            self._root = with_numbers(self._written, reading)
+
+    @property
+    def written(self) -> Node:
+        """The whole document with its expressions."""
+        return self._written
+
+    def case(self, without: tuple[str, ...] = (), at: Mapping[str, float] | None = None) -> Case:
+        """The case; without: sections that are not read. at: by key path, numbers in the place of what stands there.
+
+        Raises CaseError as `load_case`.
+        """
+        reading = self._reading.again()
+        root = self._root
+        if without:
+            root = root.at(root.line, root.column)
+            root.entries = {key: entry for key, entry in self._root.entries.items() if key not in without}
+        if at:
+            root, _ = apply_overrides(root, at, reading.mistakes.append)
+        reading.mark("", root)
+        geometry = geometry_in(root, reading)
+        top = geometry.format.read(root, "", reading)
+        assert isinstance(top, Fields)
+        parts = _build(top, root, self._written, geometry, reading)
+        if top["uncertainty"] is not None:
+            from mdstopo.case.uncertainty import build_uncertainty  # most cases have none
+
+            parts["uncertainty"] = build_uncertainty(top, parts["constraints"], root, reading)
+        if reading.mistakes:
+            raise CaseError(reading.mistakes, self._file)
+        case = Case(
+            title=top["title"],
+            path=self._place,
+            name="case" if self._place is None else self._place.stem,
+            text=self._text,
+            sha256=self._sha256,
+            overrides=FrozenDict(self._overrides),
+            files=FrozenDict(reading.files),
+            marks=reading.marks(),
+            warnings=tuple(reading.warnings),
+            **parts,
+        )
+        return with_start_set(case) if case.priced_groups else case
 
 
 def measured(root: Node) -> dict[str, float]:
@@ -145,8 +184,11 @@ def _parsed(text: str, reading: Reading, file: str) -> Node:
     return root
 
 
-def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dict[str, Any]:
-    """The parts of the case, as far as they can be made; notes every mistake on the way."""
+def _build(top: Fields, root: Node, written: Node, geometry: Geometry, reading: Reading) -> dict[str, Any]:
+    """The parts of the case, as far as they can be made; notes every mistake on the way.
+
+    written: the whole case with its expressions, which are numbers in root.
+    """
     declare_joints(top["joints"], reading)
     _check_references(top, reading)
     times = windows(top, reading)
@@ -159,7 +201,7 @@ def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dic
     complete = isinstance(top["members"], dict) and len(made) == len(top["members"])
     groups = designed if complete or top["members"] is None else None
     motions = {case: build_motions(by_body, geometry) for case, by_body in by_case.items()}
-    variables = build_variables(top, groups, reading)
+    variables, follows = build_variables(top, groups, written, reading)
     movable, coordinates = build_movable(top, points, groups, frames, reading)
     variables += coordinates
     warn_assemble(top, reading)
@@ -179,6 +221,7 @@ def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dic
         "solver": build_solver(top["solver"], times, reading),
         "variables": variables,
         "movable": movable,
+        "follows": follows,
         "dimension": geometry.number,
         "fit": _fit(top, root, frames, reading),
         **build_shared(top, groups, reading),

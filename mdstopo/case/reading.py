@@ -68,6 +68,8 @@ class Reading:
         self.unit = ""
         #: by their path, the SI values of numbers that were written with a unit
         self.measured: dict[str, float] = {}
+        #: by the path of a number that follows from a defined name which is a design variable: that variable
+        self.followed: dict[str, str] = {}
         self.mistakes: list[Mistake] = []
         self.warnings: list[Mistake] = []
         self.files: dict[str, str] = {}
@@ -77,6 +79,13 @@ class Reading:
         self._origins: dict[str, str] = {}
         self._included: dict[str, bytes | str] = {}
         self._ignored: set[tuple[int, int, str]] = set()
+
+    def again(self) -> Reading:
+        """A reading of the same file that goes on from here; what it notes is its own."""
+        other = Reading(self.folder)
+        other.mistakes, other.warnings, other.files = [*self.mistakes], [*self.warnings], dict(self.files)
+        other._ignored, other._included = set(self._ignored), self._included
+        return other
 
     def mark(self, path: str, node: Node, key: Node | None = None) -> None:
         """Note the place of `path`: its value's, or its key's where the value begins on a later line."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.definitions import Definitions
+from mdstopo.case.definitions import DEFINED_NAME, Definitions
 from mdstopo.case.integrators import names as integrators
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import (
@@ -119,9 +119,15 @@ _VARIABLE = Record(
                 "a member group or a list of member groups", scalar=GROUP, sequence=ListOf(GROUP, 1, "member groups")
             ),
             "whose law it is; of several groups, all have the same values",
-            required=True,
+            otherwise="a defined name is meant, with `of`",
         ),
-        Key("parameter", _PARAMETER, "which key of the law varies", required=True),
+        Key("parameter", _PARAMETER, "which key of the law varies; needed beside `group`"),
+        Key(
+            "of",
+            DEFINED_NAME,
+            "a name in `define` that varies, `define.k`, and with it every number that is an expression of it",
+            otherwise="a parameter of laws is meant, with `group`",
+        ),
         Key(
             "law",
             Number(minimum=0, whole=True),
@@ -134,18 +140,27 @@ _VARIABLE = Record(
             "how many values there are",
             default="group",
         ),
-        Key("initial", NUMBER, "where the optimiser begins, in the unit of the parameter", otherwise="the law's own"),
+        Key(
+            "initial",
+            NUMBER,
+            "where the optimiser begins, in the unit of the parameter",
+            otherwise="the law's own, or the defined number",
+        ),
         Key("lower", NUMBER, "lower bound, within what the law allows", required=True),
         Key("upper", NUMBER, "upper bound", required=True),
         Key(
             "cost",
             NOT_NEGATIVE,
-            "what a unit of each value adds to volume rows that cover the group, as V_i does for a unit of alpha",
+            "what a unit of each value adds to volume rows that cover the group, or one in which something follows "
+            "from the name, as V_i does for a unit of alpha",
             default=0.0,
         ),
     ),
-    doc="A parameter of laws that the optimiser varies, whether alpha of its group varies or not. Its value takes the "
-    "place of the law's own.",
+    one_of=(("group", "of"),),
+    never_both=(("of", "parameter"), ("of", "law"), ("of", "each")),
+    needs=(("group", "parameter"),),
+    doc="A parameter of laws or a defined name that the optimiser varies, whether alpha varies or not. Its value takes "
+    "the place of the one that the case states.",
 )
 DESIGN = Record(
     "design settings",
@@ -161,7 +176,11 @@ DESIGN = Record(
             "lists of groups with equal counts: member k of each has the same alpha",
             default=(),
         ),
-        Key("variables", Named(_VARIABLE, "design variable"), "parameters of laws that vary, by name"),
+        Key(
+            "variables",
+            Named(_VARIABLE, "design variable"),
+            "parameters of laws and defined names that vary, by name",
+        ),
         Key(
             "catalogue",
             ByName(
@@ -174,7 +193,8 @@ DESIGN = Record(
             otherwise="any size between the bounds",
         ),
     ),
-    doc="The design variables: alpha, one for each member with `design: true`, and parameters of laws. In `initial`, "
+    doc="The design variables: alpha, one for each member with `design: true`, parameters of laws, and defined "
+    "names. In `initial`, "
     "`lower`, `upper` and `power` groups left out have the default.",
 )
 _RESPONSE = response_kinds(RESPONSES, IN_SPACE_ALONE, OF_OTHERS)

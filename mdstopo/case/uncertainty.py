@@ -87,6 +87,9 @@ def _numbers(fields: Fields, root: Node, reading: Reading) -> list[UncertainNumb
             reading.mistake(here, f"found {found(node)} at {key}; a distribution belongs to one number")
         elif key in built:
             reading.mistake(here, f"{key} has a distribution already")
+        elif key in reading.followed:
+            owner = reading.followed[key]
+            reading.mistake(here, f"{key} cannot be uncertain: it follows from the design variable {owner}")
         elif keys is not BAD and keys.good():
             distribution = _distribution(keys, nominal, reading)
             if distribution is not None:

@@ -69,7 +69,7 @@ def _total(sums: dict[str, float], names: tuple[str, ...]) -> float:
 def _covered(row: VolumeRow, known: dict[str, float], priced: list[Variable]) -> tuple[str, ...]:
     """The groups and variables that a row sums up."""
     groups = [name for name in row.groups if name in known]
-    return (*groups, *(f"variable {each.name}" for each in priced if set(each.groups) & set(row.groups)))
+    return (*groups, *(f"variable {each.name}" for each in priced if {*each.groups, *each.reached} & set(row.groups)))
 
 
 def _most_beside(

@@ -270,8 +270,12 @@ def _say_variables(output: Output, case: "Case") -> None:
         return
     from mdstopo.cli.show import values_text
 
-    of_laws = not all(each.points for each in case.variables)
-    what = " and ".join(["values of laws"] * of_laws + ["coordinates of points"] * bool(case.movable))
+    kinds = {
+        "values of laws": any(each.groups for each in case.variables),
+        "defined names": any(each.defined for each in case.variables),
+        "coordinates of points": bool(case.movable),
+    }
+    what = " and ".join(kind for kind, there in kinds.items() if there)
     output.say(f"{case.space.length - case.n_design} {what} that vary")
     rows = [["variable", "of", "values", "initial", "lower", "upper", "unit", "cost"]]
     for each in case.variables:

@@ -201,7 +201,7 @@ def _say_members(output: Output, view: "ResultView", count: int) -> None:
         return
     values = view.under("design/variables")
     if values:
-        output.say("design variables of laws")
+        output.say("design variables beside alpha")
         output.table([["name", "value"], *([name, values_text(each)] for name, each in values.items())])
     if not len(view.alpha):
         return

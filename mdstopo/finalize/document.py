@@ -26,6 +26,7 @@ from mdstopo.case.reading import Reading
 from mdstopo.case.start_geometry import Frames, frames_of
 from mdstopo.case.words import inside
 from mdstopo.finalize.apart import free_name
+from mdstopo.finalize.names import following_law, kept_expressions
 from mdstopo.finalize.scaled_laws import sized as sized_law
 from mdstopo.finalize.values import Given, bound_of, differ, given, never_late, with_values
 from mdstopo.store.store_errors import StoreError
@@ -37,18 +38,21 @@ _LARGEST = ("max", "max_abs")
 def content_of(case: Case) -> Plain:
     """The document that a case was read from, with what --set changed and the rows of included files in place.
 
-    Expressions are the numbers that they come to. Raises StoreError where an included file cannot be read any more, or
-    is another than was read, and where defined names are uncertain, for no number would follow them any more.
+    Expressions are the numbers that they come to, but for those of names that were design variables. Raises StoreError
+    where an included file cannot be read any more, or is another than was read, and where defined names are uncertain,
+    for no number would follow them any more.
     """
     root = parse(case.text.removeprefix("\ufeff"), lambda _mistake: None)
     assert root is not None  # it has been read before
     root, _ = apply_overrides(root, case.overrides, lambda _mistake: None)
     _refuse_uncertain_names(case)
-    root = with_numbers(root, Reading(Path()))
-    root.entries.pop(SECTION, None)
+    kept, defined = kept_expressions(root, case)
+    root = with_numbers(root, Reading(Path()), kept)
+    if not defined:
+        root.entries.pop(SECTION, None)
     content = _plain(root, _files(case), measured(root), "")
     assert isinstance(content, dict)
-    return content
+    return {**content, SECTION: defined} if defined else content
 
 
 def _refuse_uncertain_names(case: Case) -> None:
@@ -178,7 +182,7 @@ def _members(
         for i in range(len(group)):
             name, size = names[first + i], float(design[first + i])
             if name:
-                laws = _laws(case, group, i, size**group.power, values)
+                laws = _laws(case, group, i, size**group.power, values, content["members"].get(group.name))
                 members[name] = {**_ends(group, i, frames), "law": laws, "cost": size * float(group.cost[i])}
         first += len(group)
     return members
@@ -193,10 +197,19 @@ def _at_values(stated: Plain, values: Given, case: Case) -> Plain:
     return {**stated, "law": found if isinstance(stated["law"], list) else found[0]}
 
 
-def _laws(case: Case, group: MemberGroup, i: int, factor: float, values: FloatArray) -> Plain | list[Plain]:
-    """The laws of member `i` with its size and its parameters in them."""
+def _laws(
+    case: Case, group: MemberGroup, i: int, factor: float, values: FloatArray, stated: Plain | None = None
+) -> Plain | list[Plain]:
+    """The laws of a member with its size and its parameters in them.
+
+    case, group, i: the case, a group of it, and the place of the member there.
+    factor: its size to its power. values (P,): of the variables.
+    stated: the group in the document, with expressions that are kept; None: none are.
+    """
     laws = with_values(group.laws, given(case, group, i, values))
     found = [never_late(sized_law(law, factor), case) for law in laws]
+    if stated is not None:
+        found = [following_law(stated["law"], k, laws[k], each, factor) for k, each in enumerate(found)]
     return found[0] if len(found) == 1 else found
 
 

@@ -19,6 +19,7 @@ from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.equilibria import Comparison, compare_equilibria
 from mdstopo.finalize.keep import check, check_restricted, chosen, kept_values, one_alpha, places, restricted
+from mdstopo.finalize.names import with_names_fixed
 from mdstopo.finalize.values import Parameter, told_apart
 from mdstopo.scene.refusals import refusals
 from mdstopo.session.outcome import Outcome, Progress
@@ -91,8 +92,8 @@ def opened(
 ) -> tuple[Case, FloatArray]:
     """The case of a run, with further keys set, and its best design (N + P,), alphas that are one made so.
 
-    Points that were design variables stay where the design has them, and are none any more. Raises CaseError and
-    StoreError.
+    Points and defined names that were design variables stay where the design has them, and are none any more. Raises
+    CaseError and StoreError.
     """
     if view.kind != "run":
         raise StoreError(f"{view.path}: a result of `{view.kind}`; finalize takes one of `run`")
@@ -115,7 +116,7 @@ def opened(
     if words := unshared(case, design):
         notify(words)
         design = np.concatenate([space.expand(space.reduce(design))[: case.n_design], design[case.n_design :]])
-    return with_points_fixed(case, design)
+    return with_points_fixed(*with_names_fixed(case, design))
 
 
 def ready(case: Case, design: FloatArray, keep: int | None, threshold: float | None) -> tuple[IndexArray, Case]:

@@ -66,7 +66,7 @@ def with_values(laws: tuple[Law, ...], values: Given) -> list[Law]:
 def never_late(stated: dict[str, Any], case: Case) -> dict[str, Any]:
     """A law as the file states it. One that would end before it begins never acts: it begins when all is over."""
     begin, until = stated.get("active_from"), stated.get("active_until")
-    if begin is None or until is None or begin < until:
+    if begin is None or until is None or isinstance(begin, str) or isinstance(until, str) or begin < until:
         return stated
     after = max(begin, *(each.end for each in case.load_cases))
     return {key: value for key, value in (stated | {"active_from": after}).items() if key != "active_until"}

@@ -5,7 +5,7 @@ loads, gravity or velocities at the start follow from. What moves geometry (plac
 motions, bushings) is differentiated by central differences of motions that are computed more accurately.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
@@ -17,12 +17,16 @@ from mdstopo.case.design_variables import varying as may_vary
 from mdstopo.case.errors import CaseError
 from mdstopo.case.fitting import FitNumber
 from mdstopo.case.model import Case
+from mdstopo.case.named_variables import laws_that_follow
+from mdstopo.case.reader import Document
 from mdstopo.case.words import inside
 from mdstopo.engine import Evaluator
 from mdstopo.fit.prepared import LawPlace, case_at, varying
 from mdstopo.general.observed import BALANCE
 
 EXACT, DIFFERENCES = "exact", "differences"
+#: what the keys of defined names begin with
+DEFINED = "define."
 #: by how much numbers are shifted, relative to their size: for formulas, and for motions
 SHIFT, SHIFT_OF_MOTIONS = 1e-3, 1e-4
 #: the size of a number is at least this share of the way between its bounds
@@ -48,6 +52,7 @@ class Numbers:
         self._places_of = tuple(places for places, _ in found)
         #: of each number what it changes beside: nothing, the balance, or anything
         self.effects = tuple(effect for _, effect in found)
+        self._follow = _FollowingLaws(case, self.keys, self.places)
         #: how predictions are differentiated by each
         self.derivatives = tuple(DIFFERENCES if effect == "anything" else EXACT for effect in self.effects)
         #: whether the scene stays the same but for parameters of laws that are known without reading the case again
@@ -72,10 +77,10 @@ class Numbers:
         """(L, n): their derivatives by the numbers at x (n,)."""
         if self.straight is not None:
             return self.straight[1]
-        columns = [
-            self.slope(i, x, self._read, SHIFT, sixth=True) if own else np.zeros(len(self.places))
-            for i, own in enumerate(self._places_of)
-        ]
+        columns = []
+        for i, own in enumerate(self._places_of):
+            column = self._follow.slopes(i, own, x) if own else np.zeros(len(self.places))
+            columns.append(self.slope(i, x, self._read, SHIFT, sixth=True) if column is None else column)
         return np.stack(columns, axis=1)
 
     @cached_property
@@ -198,6 +203,32 @@ class Numbers:
             before, now = self._arrays[name]._asdict(), scene.model._asdict()
             found |= {key for key, array in now.items() if not np.array_equal(array, before[key])}
         return found
+
+
+class _FollowingLaws:
+    """Parameters of laws that are expressions of defined names which are fitted: their exact derivatives.
+
+    case: the case. keys: of all numbers that are fitted. places: parameters of laws that follow from any of them.
+    """
+
+    def __init__(self, case: Case, keys: Sequence[str], places: Sequence[LawPlace]) -> None:
+        self._named = [i for i, key in enumerate(keys) if key.startswith(DEFINED)]
+        self._places = places
+        self._rows: dict[LawPlace, int] = {}
+        if not self._named:
+            return
+        written = Document(case.text, path=case.path, overrides=case.overrides).written
+        words = [keys[i].removeprefix(DEFINED) for i in self._named]
+        self._expressions, found, paths = laws_that_follow(written, words)
+        # what is fitted itself does not follow any more
+        self._rows = {place: k for k, (place, path) in enumerate(zip(found, paths, strict=True)) if path not in keys}
+
+    def slopes(self, i: int, own: Collection[LawPlace], x: FloatArray) -> FloatArray | None:
+        """(L,) of all places by number i at x (n,), of which own follow; None where that is not known exactly."""
+        if i not in self._named or any(place not in self._rows for place in own):
+            return None
+        slopes = self._expressions.slopes(x[self._named])[:, self._named.index(i)]
+        return np.array([slopes[self._rows[place]] if place in own else 0.0 for place in self._places])
 
 
 def _laws_apart(base: Case, changed: Case) -> tuple[set[LawPlace], Case | None]:

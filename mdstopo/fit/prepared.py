@@ -47,6 +47,7 @@ def prepared(case: Case) -> Case:
         uncertainty=None,
         variables=(),
         movable=(),
+        follows=None,
     )
 
 

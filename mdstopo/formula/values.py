@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from mdstopo.formula.errors import FormulaError
 from mdstopo.formula.parser import Formula
@@ -76,10 +76,10 @@ _KERNELS: dict[str, Callable[..., float]] = {
 }
 
 
-def all_values(root: Expression, names: Mapping[str, float]) -> dict[Expression, float]:
+def all_values(names: Mapping[str, float], *roots: Expression) -> dict[Expression, float]:
     """Every part's value; nothing raises, what has no value is NaN. Both values of an `if` are computed."""
     found: dict[Expression, float] = {}
-    for part in parts(root):
+    for part in parts(*roots):
         if part.operator == NUMBER:
             found[part] = part.value
         elif part.operator == NAME:
@@ -89,14 +89,20 @@ def all_values(root: Expression, names: Mapping[str, float]) -> dict[Expression,
     return found
 
 
+def values_of(names: Mapping[str, float], roots: Sequence[Expression]) -> list[float]:
+    """Values of several expressions; parts that they have in common are computed once. NaN where there is none."""
+    found = all_values(names, *roots)
+    return [found[root] for root in roots]
+
+
 def value_of(root: Expression, names: Mapping[str, float]) -> float:
     """An expression's value, NaN where it has none."""
-    return all_values(root, names)[root]
+    return all_values(names, root)[root]
 
 
 def finite_value(formula: Formula, names: Mapping[str, float]) -> float:
     """A formula's value; raises FormulaError, at the part to blame, where it is not finite."""
-    found = all_values(formula.root, names)
+    found = all_values(names, formula.root)
     if math.isfinite(found[formula.root]):
         return found[formula.root]
     part = _to_blame(formula.root, found)

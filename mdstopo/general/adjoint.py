@@ -348,7 +348,7 @@ def integral_gradient(
             tag, model, tables, member_state, history, count, count - 1, 1.0, lam_q, lam_v, bar_set, bars, rows_bar,
             sets_bar, drops, j, square, workspace, np.empty((0, n)), out, work,
         )  # fmt: skip
-        keep_start(model, history, lam_q, bar_set, start, out)
+        keep_start(model, history, lam_q, lam_v, bar_set, start, out)
     return total
 
 

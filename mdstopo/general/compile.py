@@ -15,7 +15,7 @@ from mdstopo.general.driven_integrals import integration_times
 from mdstopo.general.drives import Drives, drives, drives_all, motion_times
 from mdstopo.general.expression_rows import expression_codes, expression_data
 from mdstopo.general.layout import arrange
-from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel
+from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel, without_numbers
 from mdstopo.general.timed_loads import kink_times, mistake_of, parts_of, timed_loads
 from mdstopo.general.variables import (
     adds_damping,
@@ -135,7 +135,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
             [*layout.size, int(by_order_8), len(layout.schur_constant), bodies.load_slopes, bodies.attitude], np.int64
         ),
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
-        varied=entries, along=along(entries),
+        varied=entries, along=along(entries), **without_numbers(),
     )  # fmt: skip
     skipped = _skipped(case, load_case, dimension, damped)
     return GeneralScene(

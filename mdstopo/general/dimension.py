@@ -41,7 +41,8 @@ class Dimension:
     masses (body): mass of each freedom. velocities (body, row of home): those of its freedoms at the start.
     stated (home): (n,) where each freedom is at home, from which stated positions are measured; 0 of turns.
     places (home, body, points): global places (K, d) at home of points (K, d) of a body, in the axes of arrays.
-    loads (load_case, index, times, frames): as arrays. timed (load, frames): its parts that are formulas.
+    loads (load_case, index, times, frames, keep): as arrays (`scene.loads`). timed (load, frames): its parts that are
+    formulas.
     bushings (case, index, pairs, home): as arrays.
     half_turn (pairs, home, q): the first of the states q (T, n_q) at which one of the pairs (K, 2) of bodies has turned
     by half a turn, where that may not be, and which; None where none has. contacts (case, index, pairs, frames): as
@@ -63,7 +64,7 @@ class Dimension:
     velocities: Callable[[Any, FloatArray], list[float]]
     stated: Callable[[FloatArray], FloatArray]
     places: Callable[[FloatArray, int, FloatArray], FloatArray]
-    loads: Callable[[LoadCase, dict[str, int], FloatArray, Frames], Loads]
+    loads: Callable[..., Loads]
     timed: Callable[[Load, Frames], Iterable[TimedPart]]
     bushings: Callable[[Case, dict[str, int], Pairs, FloatArray], tuple[IndexArray, FloatArray]]
     half_turn: Callable[[IndexArray, FloatArray, FloatArray], tuple[int, int] | None]

@@ -31,9 +31,10 @@ from mdstopo.general.model import (
 )
 from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
 from mdstopo.general.permanent_sets import count_sets, sets_forward, through_sets, time_forward
+from mdstopo.general.scene_numbers import balance_slope, begin_velocities, number_through_step
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, carve_history, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_pair
-from mdstopo.mechanics.kinematics.kinematics_interface import add_loads, member_rows
+from mdstopo.mechanics.kinematics.kinematics_interface import member_rows
 from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
 
@@ -260,6 +261,7 @@ def _parameters_through_step(model, member_state, history, w, column, sets, by_s
                         force = slope * row[r] + member_state[SCALE, i] * moved[r]
                         for d in range(width):
                             spare[d] -= force * matrix[b, d]
+        number_through_step(model, c - column.shape[0] + model.apart.shape[0], history, w, segment, matrix, spare)
         for m in range(sets.shape[0]):
             for d in range(width):
                 spare[d] += sets[m, c] * by_set[m, d]
@@ -339,11 +341,12 @@ def jump(model, history, member_state, count, state, column, sets, drops, j, squ
 def begin(model, history, first, column, sets):
     """Column and sets at the start, whose positions have the derivatives first (M_padded, n), or none (no rows).
 
-    The sets that members begin with depend on parameters besides.
+    The sets that members begin with depend on parameters besides, and velocities on numbers of the scene.
     """
     for i in range(first.shape[0]):
         for d in range(first.shape[1]):
             column[i, d] = first[i, d]
+    begin_velocities(model, column)
     if (first.shape[0] > 0 or model.varied.shape[0] > 0) and sets.shape[0] > 0:
         for e in range(history.index[0, EVENTS]):
             sets_forward(model, history, e, column, sets)
@@ -455,29 +458,6 @@ def push(
             padded[i] += bar_set[m] * sets[m, i]
     unscale_general(model.block, model.power, alpha, padded, out)
     return -1
-
-
-@kernel
-def balance_slope(one, other, apart, segment, t, q, v, a, f, out):
-    """Derivative of M a - F by a number of the scene that only masses and loads depend on, at fixed motion.
-
-    Constant:
-      one, other: the scene with a larger and with a smaller number.
-      apart: by how much the numbers differ.
-    In:
-      segment, t: segment of the scene's times, and time in it (s).
-      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
-    Out:
-      out (n,): the derivative (N, N m per unit of the number). f (n,): scratch.
-    """
-    f[:] = 0.0
-    add_loads(other, segment, t, q, v, f)
-    for d in range(out.shape[0]):
-        out[d] = (one.mass[d] - other.mass[d]) * a[d] + f[d]
-    f[:] = 0.0
-    add_loads(one, segment, t, q, v, f)
-    for d in range(out.shape[0]):
-        out[d] = (out[d] - f[d]) / apart
 
 
 @kernel

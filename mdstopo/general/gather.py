@@ -22,6 +22,7 @@ from mdstopo.general.model import (
 )
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
+from mdstopo.general.scene_numbers import add_numbers
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
 from mdstopo.general.switches import carriers
@@ -151,6 +152,9 @@ def _add(model, segment, when, member_state, q, v, a, turned, z, weight, out):
     if model.varied.shape[0] > 0:
         for j in range(count):
             add_parameters(model, segment, when[j], member_state, q[j], v[j], a[j], z[j], weight, out)
+    if model.apart.shape[0] > 0:
+        for j in range(count):
+            add_numbers(model, segment, when[j], q[j], v[j], a[j], z[j], out)
 
 
 @kernel

@@ -84,12 +84,12 @@ class GeneralDriver:
         #: coordinates and velocities at the start: as stated, or as assembled
         self._start = model.q0, model.v0
         self._model = model
+        self._placing = Placing(case, scene.load_case, model) if case.variables else None
         self._packed = self.ints, self.floats = self.pack(model)
         integrated = any(name in INTEGRALS for name in scene.reductions)
         self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS, float(integrated)])
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
-        self._placing = Placing(case, scene.load_case, model) if case.variables else None
         varied = 0 if self._placing is None else len(self._placing.initial)
         self._alpha = np.zeros(n_design)
         #: of the laws' variables; none before the first design
@@ -147,6 +147,8 @@ class GeneralDriver:
 
     def pack(self, model: GeneralModel) -> tuple[IndexArray, FloatArray]:
         """The arrays of a scene of this driver's bodies, as entries take them."""
+        if self._placing is not None:
+            model = self._placing.with_twins(model, self.scene.kinematics)
         return pack_general(model, self.scene.kinematics)
 
     @property
@@ -770,6 +772,10 @@ class GeneralSteps:
 
 
 def _scenes(case: Case) -> Mapping[str, GeneralScene]:
+    if case.follows is not None:
+        from mdstopo.general.numbers_of_scene import refuse_other_places  # few cases have such
+
+        refuse_other_places(case, lambda each, load_case: compile_general(each, load_case).model)
     return {load_case.name: compile_general(case, load_case) for load_case in case.load_cases}
 
 

@@ -8,6 +8,8 @@ solved together with the accelerations (`solve_accelerations`); rows that others
 
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
+
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import by_type, kernel
 from mdstopo.general.structures import bundle
@@ -188,6 +190,20 @@ class GeneralModel(NamedTuple):
             "how much the free length grows (m per m)",
         ),
     ]
+    apart: Annotated[
+        FloatArray,
+        Field("n_name", "of names that masses, loads or velocities follow from: how far those of `twins` are apart"),
+    ]
+    twins: Annotated[
+        FloatArray,
+        Field("n_name, 2, n_twin", "the packed scene, without members, with each of these larger and smaller"),
+    ]
+    twin_ints: Annotated[IndexArray, Field("n_twin_int", "the packed integers of these scenes")]
+
+
+def without_numbers() -> dict[str, Any]:
+    """The fields `apart`, `twins` and `twin_ints` of a scene that is differentiated by none."""
+    return {"apart": np.zeros(0), "twins": np.zeros((0, 2, 0)), "twin_ints": np.zeros(0, dtype=np.int64)}
 
 
 class PlanarView:
@@ -226,6 +242,18 @@ def _planar(ints, floats):
 @views_of(FIELDS, SpatialView, kernel)
 def _spatial(ints, floats):
     """The `GeneralModel` whose arrays are views of the packed ones."""
+
+
+@kernel
+def planar_twin(model, b, side):
+    """The scene with number b of `GeneralModel.apart` larger (side 0) or smaller (side 1), in a plane."""
+    return _planar(model.twin_ints, model.twins[b, side])
+
+
+@kernel
+def spatial_twin(model, b, side):
+    """The scene with number b of `GeneralModel.apart` larger (side 0) or smaller (side 1), in space."""
+    return _spatial(model.twin_ints, model.twins[b, side])
 
 
 @kernel

@@ -42,6 +42,7 @@ from mdstopo.general.model import (
 )
 from mdstopo.general.parameters import moved_side, varies_member
 from mdstopo.general.responses import MEMBER_FORCE, energy_weight, member_force
+from mdstopo.general.scene_numbers import add_start_velocities
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,
@@ -408,19 +409,20 @@ def sets_back(model, history, e, bar, lam_q, out):
 
 
 @kernel
-def keep_start(model, history, lam_q, bar, start, out):
+def keep_start(model, history, lam_q, lam_v, bar, start, out):
     """Finish a reverse sweep at the start: pull back the sets that members begin with, and keep the cotangents there.
 
     Constant:
       model: the compiled scene.
       history: the history of steps (`StepHistory`).
     In place:
-      lam_q (n,): cotangents of the start's coordinates; those of the sets are added to them.
+      lam_q, lam_v (n,): cotangents of the start's coordinates and velocities; those of the sets are added to lam_q.
       bar (slots,): cotangents of the sets, which become 0 for those that members begin with.
     Out:
       start (n,): lam_q afterwards; or no length: not wanted.
       out (M_padded + P,): derivatives by the parameters, added to behind the members.
     """
+    add_start_velocities(model, lam_v, out)
     if start.shape[0] == 0 and model.varied.shape[0] == 0:
         return
     if bar.shape[0] > 0:

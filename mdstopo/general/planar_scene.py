@@ -43,9 +43,9 @@ def _places(home: FloatArray, body: int, points: FloatArray) -> FloatArray:
     return np.asarray(np.array([x, y]) + points @ np.array([[c, s], [-s, c]]))
 
 
-def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames: Frames) -> Loads:
+def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames: Frames, keep: bool = False) -> Loads:
     del frames
-    return generalised_loads(load_case, index, times)
+    return generalised_loads(load_case, index, times, keep)
 
 
 def _timed(load: Load, frames: Frames) -> Iterator[TimedPart]:

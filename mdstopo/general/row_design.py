@@ -24,6 +24,7 @@ from mdstopo.general.model import (
     VARIED_VALUE,
 )
 from mdstopo.general.parameters import parameter_slopes
+from mdstopo.general.scene_numbers import add_numbers_of_rows
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
 from mdstopo.general.switches import carriers
@@ -104,6 +105,9 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
     if model.varied.shape[0] > 0:
         for j in range(stages):
             _add_parameters(model, segment, history, o + j, member_state, z, j, out)
+    if model.apart.shape[0] > 0:
+        for j in range(stages):
+            add_numbers_of_rows(model, segment, history, o + j, z, j, out)
 
 
 @kernel

@@ -136,7 +136,7 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
             lam_x[:active], bar_set[:active], z[:active], y, workspace, out[:active], work,
         )  # fmt: skip
     for m in range(total):
-        keep_start(model, history, lam_q[m], bar_set[m], starts[m], out[m])
+        keep_start(model, history, lam_q[m], lam_v[m], bar_set[m], starts[m], out[m])
 
 
 @entry

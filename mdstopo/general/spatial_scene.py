@@ -121,10 +121,11 @@ def _three(given: Any, times: FloatArray) -> FloatArray:
     return np.stack([segment_values(signal, times) for signal in signals], axis=1)
 
 
-def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames: Frames) -> Loads:
+def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames: Frames, keep: bool = False) -> Loads:
     """Gravity and forces through centres of mass by freedoms; apart from them what depends on a body's turn.
 
-    Moments are components in principal axes by freedoms, which a global one has not while the body turns.
+    Moments are components in principal axes by freedoms, which a global one has not while the body turns. keep: as of
+    `generalised_loads`.
     """
     force = np.zeros((len(times) - 1, len(index), SPATIAL.freedoms, 2))
     for i, body in enumerate(load_case.bodies):
@@ -140,17 +141,17 @@ def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames
             # (P^T f) of each segment's values and slopes
             own, moment = (np.einsum("ji,sjk->sik", turned, each) for each in (own, moment))
             force[:, b, 3:] += moment
-            if np.any(own):
+            if keep or np.any(own):
                 turning.append((load, FOLLOWS, np.concatenate([own, np.zeros_like(moment)], axis=1)))
             continue
-        if not any(load.at_local):
+        if not any(load.at_local) and not keep:
             force[:, b, PLACE] += own
             own = np.zeros_like(own)
         for follows, part, couple in (
             (GLOBAL, own, moment),
             (ACCELERATES, np.zeros_like(own), _three(load.angular_acceleration, times)),
         ):
-            if np.any(part) or np.any(couple):
+            if keep or np.any(part) or np.any(couple):
                 turning.append((load, follows, np.concatenate([part, couple], axis=1)))
     arms = [in_frame(frames, load.body, np.array(load.at_local, dtype=np.float64)) for load, _, _ in turning]
     values = [value for _, _, value in turning]

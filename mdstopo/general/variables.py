@@ -16,6 +16,7 @@ from mdstopo.general.kinks import landed
 from mdstopo.general.model import COUNT, GROUP, MEMBER_EXCESS, MEMBER_FREE_LENGTH, START, VARIED_COLUMNS, GeneralModel
 from mdstopo.general.moved_ends import WIDTH, MovedEnds, rows_of_ends
 from mdstopo.integrators.choice import has_coarse_steps
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -134,10 +135,17 @@ class Placing:
                     taken[variable.parameter] = first + (i if variable.each == "member" else 0)
             first += variable.count
         self._ends = MovedEnds(case, load_case, model, blocks) if case.movable else None
+        self._scene = None
+        if case.follows is not None:
+            from mdstopo.general.numbers_of_scene import NumbersOfScene  # few cases have such
+
+            self._scene = NumbersOfScene(case, load_case, model)
         self.initial = np.concatenate([each.initials for each in case.variables])
 
     def at(self, model: GeneralModel, values: FloatArray) -> GeneralModel:
         """The arrays with values (P,) in them."""
+        if self._scene is not None:  # names of the scene come last
+            model = self._scene.at(model, values[len(values) - self._scene.count :])
         if self._ends is not None:
             model = self._ends.at(model, values)
         law, member = model.law.copy(), model.member.copy()
@@ -181,3 +189,7 @@ class Placing:
             begins = begin == start and int(row[0]) not in held
             row[3] = (row[1] == laws.ACTIVE_FROM and begins) or (row[1] == laws.ACTIVE_UNTIL and until == end)
         return model._replace(active=active, varied=varied)
+
+    def with_twins(self, model: GeneralModel, bodies: Kinematics) -> GeneralModel:
+        """The arrays at the values that were put in last, with the twins that numbers of the scene need."""
+        return model if self._scene is None else self._scene.with_twins(model, bodies)

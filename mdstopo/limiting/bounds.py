@@ -46,6 +46,10 @@ def bound(case: Case, objective: Objective) -> Bound:
         return Bound(
             None, "ends of members are design variables: bounds are known of ends that stay in their body alone"
         )
+    if case.follows is not None:
+        return Bound(
+            None, "a defined name is a design variable: bounds are known of numbers that vary each by itself alone"
+        )
     load_case = case.load_case(objective.load_case)
     if formulas_of(load_case):
         return Bound(None, "bounds are known of constant and tabulated loads and motions, of formulas of time not")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
-from mdstopo.case.movable import placed
+from mdstopo.scene.through import as_designed
 from mdstopo.store.result_reader import ResultView, read_result
 from mdstopo.store.store_errors import DamagedError, StoreError
 from mdstopo.store.stored_case import case_of
@@ -54,10 +54,11 @@ class Source:
 
     @cached_property
     def case(self) -> Case:
-        """The same with points that are design variables where the design that is shown has them."""
+        """The same with points that are design variables, or follow from such, where the design shown has them."""
         case, arrays = self.stated, self.view.arrays
         shown = "design/alpha" in arrays or "pareto/alpha" in arrays
-        return placed(case, self.design) if case.movable and shown else case
+        moving = case.movable or any(each.moved for each in case.variables)
+        return as_designed(case, self.design) if moving and shown else case
 
     def as_stated(self) -> "Source":
         """The same with points where the case states them."""

@@ -20,4 +20,5 @@ def response_history(engine: "Evaluator", alpha: Floats, load_case: str, times: 
     if times[-1] > motion.t[-1]:
         raise ValueError(f"the motion in load case {load_case} ends at {motion.t[-1]:g} s: {motion.status.value}")
     looked = [objective.name for objective in engine.case.objectives if objective.load_case == load_case]
-    return dict(zip(looked, engine.driver(load_case).response_history(alpha, times), strict=False))
+    design = engine.computed(engine.design(alpha))
+    return dict(zip(looked, engine.driver(load_case).response_history(design, times), strict=False))

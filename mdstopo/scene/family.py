@@ -31,7 +31,11 @@ def beyond_springs(case: Case) -> str:
     if case.priced_groups and case.uncertainty is not None:
         return "priced candidates of an uncertain case"
     if case.variables:
-        return "movable points" if all(each.points for each in case.variables) else "design variables of laws"
+        if all(each.points for each in case.variables):
+            return "movable points"
+        if all(each.points or each.defined for each in case.variables):
+            return "design variables of defined names"
+        return "design variables of laws"
     for group in case.members:
         found = _law(group)
         if found:

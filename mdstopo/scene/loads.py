@@ -19,10 +19,11 @@ class Loads(NamedTuple):
     load_force: FloatArray
 
 
-def generalised_loads(load_case: LoadCase, index: dict[str, int], times: FloatArray) -> Loads:
+def generalised_loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, keep: bool = False) -> Loads:
     """The loads of a load case within segments of time, with gravity.
 
     index: place of each body in the state, of all that the state has. times (n_seg + 1,): ends of the segments (s).
+    keep: whether a load at a point that is zero, or at the centre, is kept as one that turns, as others of it are not.
     """
     force = np.zeros((len(times) - 1, 3 * len(index), 2))
     for i, body in enumerate(load_case.bodies):
@@ -34,10 +35,10 @@ def generalised_loads(load_case: LoadCase, index: dict[str, int], times: FloatAr
             continue
         b = 3 * index[load.body]
         force[:, b + 2] += segment_values(load.moment, times)
-        if load.frame == "global" and tuple(load.at_local) == (0.0, 0.0):
+        if load.frame == "global" and tuple(load.at_local) == (0.0, 0.0) and not keep:
             force[:, b] += segment_values(load.force[0], times)
             force[:, b + 1] += segment_values(load.force[1], times)
-        elif any(np.any(segment_values(component, times)) for component in load.force):
+        elif keep or any(np.any(segment_values(component, times)) for component in load.force):
             turning.append(load)
     load_force = np.zeros((len(times) - 1, len(turning), 2, 2))
     for k, load in enumerate(turning):

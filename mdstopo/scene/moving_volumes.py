@@ -8,6 +8,8 @@ design, so the optimiser gets it as it gets a constraint on a response.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
@@ -15,19 +17,20 @@ from mdstopo.case.model import Case, MemberGroup, ResponseRow, VolumeRow
 from mdstopo.case.movable import points_at, turned_out
 from mdstopo.case.start_geometry import frames_of
 from mdstopo.scene.bodies import distances
+from mdstopo.scene.through import Through
 
 
 def moves(case: Case, group: MemberGroup) -> bool:
     """Whether members of a group cost their length, and it varies."""
-    names = {each.grid for each in case.movable}
+    names = {each.grid for each in case.movable}.union(*(each.moved for each in case.variables))
     return group.design and group.cost_varies(names)
 
 
-def moving_volumes(case: Case) -> dict[int, MovingVolume]:
+def moving_volumes(case: Case) -> dict[int, MovingVolume | VolumeThrough]:
     """By number of the constraint: volume rows whose coefficients vary."""
-    groups = [group.name for group in case.members if moves(case, group)] if case.movable else []
+    groups = [group.name for group in case.members if moves(case, group)] if case.variables else []
     return {
-        i: MovingVolume(case, row)
+        i: _volume(case, row)
         for i, row in enumerate(case.constraints)
         if isinstance(row, VolumeRow) and set(row.groups) & set(groups)
     }
@@ -36,7 +39,29 @@ def moving_volumes(case: Case) -> dict[int, MovingVolume]:
 def spent(case: Case, row: VolumeRow | ResponseRow, design: FloatArray) -> float:
     """The sum of a volume row with a design (N + P,), members as long as it makes them."""
     assert isinstance(row, VolumeRow)
-    return MovingVolume(case, row).at(design)[0] if case.movable else row.spent(design)
+    moving = any(moves(case, group) for group in case.members if group.name in row.groups)
+    return _volume(case, row).at(design)[0] if moving else row.spent(design)
+
+
+def _volume(case: Case, row: VolumeRow) -> MovingVolume | VolumeThrough:
+    return MovingVolume(case, row) if case.follows is None else VolumeThrough(case, row)
+
+
+class VolumeThrough:
+    """The sum of one volume row where points follow from defined names, and its derivative."""
+
+    def __init__(self, case: Case, row: VolumeRow) -> None:
+        self._prices = row.prices if len(row.prices) else np.zeros(case.space.length - case.n_design)
+        self._through = Through(case)
+        self._of_points = MovingVolume(self._through.case, replace(row, prices=np.zeros(0)))
+
+    def at(self, design: FloatArray) -> tuple[float, FloatArray]:
+        """The sum at a design (N + P,), and its derivative (N + P,)."""
+        total, slope = self._of_points.at(self._through.design(design))
+        pulled = self._through.pull(slope)
+        n = len(design) - len(self._prices)
+        pulled[n:] += self._prices
+        return total + float(self._prices @ design[n:]), pulled
 
 
 class MovingVolume:

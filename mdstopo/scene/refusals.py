@@ -21,7 +21,8 @@ def no_derivatives(case: Case, method: str) -> tuple[str, str]:
     if all(each.points for each in case.variables):
         place, what = f"points.{case.movable[0].grid}.movable", "coordinates of points"
     else:
-        place, what = "design.variables", "parameters of laws"
+        named = not any(each.groups for each in case.variables)
+        place, what = "design.variables", "defined names" if named else "parameters of laws"
     return place, f"{method} gives no derivatives by {what}; adjoint does, and direct"
 
 

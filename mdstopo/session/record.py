@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
-from mdstopo.case.movable import placed
 from mdstopo.optimizer.start_families import best_run
 from mdstopo.optimizer.state import State
+from mdstopo.scene.through import as_designed
 from mdstopo.session.start_in_stages import ROUND, STAGE, first_row, furthest, is_done
 from mdstopo.starts.constraint_columns import constraint_values
 from mdstopo.store.contents import Datasets, design_part, ends_part
@@ -74,8 +74,8 @@ def run_part(case: Case, states: Sequence[State | None], before: int = 0, final:
     assert state is not None
     design = case.space.expand(state.best_alpha)
     part: Datasets = design_part(case, design)
-    if case.movable:
-        part |= ends_part(placed(case, design))
+    if case.movable or any(each.moved for each in case.variables):
+        part |= ends_part(as_designed(case, design))
     part |= {f"iterations/{name}": column for name, column in iteration_columns(case, state, before, final).items()}
     if len(states) > 1:
         part |= _starts_part(case, states)

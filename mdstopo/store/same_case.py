@@ -23,7 +23,8 @@ _IGNORED: dict[type, set[str]] = {
     MemberGroup: {"from_points", "to_points", "cost_by_length"},  # its ends and its costs are compared
 }
 # What later versions added, and left out by most: files from before know nothing of it.
-_ADDED = {"shared", "mirrored", "variables", "prices", "powers", "candidates", "movable", "points", "sizes"}
+_ADDED = {"shared", "mirrored", "variables", "prices", "powers", "candidates", "movable", "points", "sizes",
+          "defined", "reached", "moved", "follows"}  # fmt: skip
 _DESIGN = {"initial", "lower", "upper", "power"}
 _MAY_DIFFER = {"optimizer.max_iterations", "optimizer.tolerance", "optimizer.starts"}
 
