@@ -9,6 +9,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, LoadCase, Response, ResponseRow
 from mdstopo.case.responses import kind_of
+from mdstopo.compiler.threads import allowed
 from mdstopo.general import responses as responses_of
 from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in_frame
 from mdstopo.general.driven_integrals import integration_times
@@ -147,7 +148,10 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         driven=made.driven, drive=made.cubics, drive_frame=made.frames, drive_turn=made.turns,
         joint=joint, joint_par=joint_par, row=layout.row, place=layout.place,
         size=np.array(
-            [*layout.size, int(by_order_8), len(layout.steady), bodies.load_slopes, bodies.attitude], dtype=np.int64
+            [
+                *layout.size, int(by_order_8), len(layout.steady), bodies.load_slopes, bodies.attitude,
+                allowed() if len(case.load_cases) == 1 else 1,
+            ], dtype=np.int64,
         ), line=layout.line,
         envelope=layout.envelope, product=layout.product, steady=layout.steady,
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
