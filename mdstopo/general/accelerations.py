@@ -99,45 +99,67 @@ NO_SHIFT, OF_STEP = range(2)
 
 @kernel
 def make_workspace(model):
-    """A workspace for one state."""
+    """A workspace for one state. Most of it lies in one piece: forty pieces would take two microseconds to make."""
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
     n_joint = model.joint.shape[0]
     total = model.unknown_index.shape[0]
     both = pair_freedoms(model)
     rows = most_rows(model)
-    tangents = np.zeros((2, n // freedoms(model), shift_size(model)))
+    stages = max(STAGES) if coordinates(model) != freedoms(model) else 0
+    turned = model.home.shape[0] * attitude(model)
+    rel = turned + n_pair * pose_size(model)
+    sums = rel + n_pair * sums_size(model)
+    f = sums + n
+    k = f + n_pair * both * both
+    c = k + n_pair * both * both
+    mass = c + n_pair * both * both
+    turn = mass + n * load_slopes(model)
+    known = turn + n
+    phi = known + n_joint * rows
+    gamma = phi + n_joint * rows
+    jac = gamma + n_joint * rows * both
+    by_q = jac + n_joint * rows * both
+    by_v = by_q + n_joint * rows * both
+    pull = by_v + n_joint * rows * both
+    stiffness = pull + n_joint * both * both
+    own = stiffness + (n_joint + 1) * 4 * joint_places(model)
+    gram = own + model.size[3]
+    x = gram + total
+    slopes = x + stages * n
+    room = np.zeros(slopes + 2 * n // freedoms(model) * shift_size(model))
+    tangents = room[slopes:].reshape((2, n // freedoms(model), shift_size(model)))
     shift_tangents(model, model.q0, model.q0, tangents[NO_SHIFT])
     return Workspace(
-        np.zeros((model.home.shape[0], attitude(model))),
-        np.zeros((n_pair, pose_size(model))),
-        np.zeros((n_pair, sums_size(model))),
-        np.zeros(n),
-        np.zeros((n_pair, both, both)),
-        np.zeros((n_pair, both, both)),
-        np.zeros((n, load_slopes(model))),
-        np.zeros((n_pair, both, both)),
-        np.zeros((n_joint, rows)),
-        np.zeros((n_joint, rows, both)),
-        np.zeros((n_joint, rows)),
-        np.zeros((n_joint, rows, both)),
-        np.zeros((n_joint, rows, both)),
+        room[:turned].reshape((model.home.shape[0], attitude(model))),
+        room[turned:rel].reshape((n_pair, pose_size(model))),
+        room[rel:sums].reshape((n_pair, sums_size(model))),
+        room[sums:f],
+        room[f:k].reshape((n_pair, both, both)),
+        room[k:c].reshape((n_pair, both, both)),
+        room[mass:turn].reshape((n, load_slopes(model))),
+        room[c:mass].reshape((n_pair, both, both)),
+        room[known:phi].reshape((n_joint, rows)),
+        room[gamma:jac].reshape((n_joint, rows, both)),
+        room[phi:gamma].reshape((n_joint, rows)),
+        room[jac:by_q].reshape((n_joint, rows, both)),
+        room[by_q:by_v].reshape((n_joint, rows, both)),
         np.empty((total, 3 * model.size[1] + 1)),
         np.zeros(total, np.int64),
-        np.zeros(total),
+        room[gram:x],
         np.ones(total),
         inverse_masses(model),
         spread_masses(model),
-        np.zeros((n_joint, rows, both)),
-        np.zeros(model.size[3]),
+        room[by_v:pull].reshape((n_joint, rows, both)),
+        room[own:gram],
         np.ones((2, model.size[0])),
-        np.zeros((n_joint + 1, 4, joint_places(model))),
-        np.zeros((n_joint, both, both)),
-        np.zeros(n),
+        room[stiffness:own].reshape((n_joint + 1, 4, joint_places(model))),
+        room[pull:stiffness].reshape((n_joint, both, both)),
+        room[turn:known],
         movers(model),
         carriers(model),
         switches_of(model),
-        np.zeros((max(STAGES) if coordinates(model) != freedoms(model) else 0, n)),
+        room[x:slopes].reshape((stages, n)),
         tangents,
     )
 

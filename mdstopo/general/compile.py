@@ -9,6 +9,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, LoadCase, Response, ResponseRow
 from mdstopo.case.responses import kind_of
+from mdstopo.compiler.threads import allowed
 from mdstopo.general import responses as responses_of
 from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in_frame
 from mdstopo.general.driven_integrals import integration_times
@@ -132,7 +133,10 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         driven=made.driven, drive=made.cubics, drive_frame=made.frames, drive_turn=made.turns,
         joint=joint, joint_par=joint_par, **layout.fields(),
         size=np.array(
-            [*layout.size, int(by_order_8), len(layout.schur_constant), bodies.load_slopes, bodies.attitude], np.int64
+            [
+                *layout.size, int(by_order_8), len(layout.schur_constant), bodies.load_slopes, bodies.attitude,
+                allowed() if len(case.load_cases) == 1 else 1,
+            ], np.int64,
         ),
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
         varied=entries, along=along(entries), **without_numbers(),

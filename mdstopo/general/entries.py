@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from mdstopo.case.integrators import IntegratorKind
-from mdstopo.general import dense_output, direct, integral_gradients, peak_search, row_sweep
+from mdstopo.general import dense_output, direct, integral_gradients, peak_gradients, peak_search, row_sweep
 
 
 class Entries(NamedTuple):
@@ -20,6 +20,7 @@ class Entries(NamedTuple):
     integral_with_gradient: Any = integral_gradients.integral_with_gradient
     peaks_of_pieces: Any = peak_search.peaks_of_pieces
     peaks_of_steps: Any = peak_search.peaks_of_steps
+    peaks_vjp: Any = peak_gradients.peaks_vjp
     push: Any = direct.push
     rank_rows: Any = peak_search.rank_rows
     rows_vjp: Any = row_sweep.rows_vjp

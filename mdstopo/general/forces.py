@@ -7,7 +7,7 @@ F holds loads, gravity, members, bushings, and the part of an inerter's force th
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.contact import add_contacts
 from mdstopo.general.members import SCALE, general_sums
 from mdstopo.general.model import CODE, COUNT, INERTER, PAIR, START
@@ -110,18 +110,54 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
     In and out:
       workspace: the workspace. Set are f (N, N m), turned, and, of the pairs that carry more than joints, rel and sums.
     """
-    pair = model.pair
-    rel = workspace.rel
-    sums = workspace.sums
-    f = workspace.f
-    carries = workspace.carries
+    place_pairs(model, q, v, tangent, workspace, workspace.rel, workspace.sums)
+    general_sums(model, segment, t, member_state, workspace.rel, tangent, workspace.sums)
+    forces_of_sums(
+        model, member_state, segment, t, q, v, tangent, workspace.rel, workspace.sums, workspace.k, workspace.c,
+        workspace.turn, workspace,
+    )  # fmt: skip
+
+
+@part
+def place_pairs(model, q, v, tangent, workspace, rel, sums):
+    """Turn all bodies, find the relative poses of the pairs that carry more than joints, and set their sums to zero.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      q (n_q,), v (n,): coordinates and velocities.
+      tangent: whether sums of tangents are set to zero, too.
+    Out:
+      workspace: its attitudes `turned` are set.
+      rel (n_pair, POSE): relative poses.
+      sums (n_pair, SUMS): zeros.
+    """
     turn_bodies(model, q, workspace.turned)
-    for p in range(pair.shape[0]):
-        if carries[p] != 0:
+    for p in range(model.pair.shape[0]):
+        if workspace.carries[p] != 0:
             turned_pose(model, p, workspace.turned, q, v, rel)
             for i in range(sums_size(model) if tangent else tangent_column(model)):
                 sums[p, i] = 0.0
-    general_sums(model, segment, t, member_state, rel, tangent, sums)
+
+
+@kernel
+def forces_of_sums(model, member_state, segment, t, q, v, tangent, rel, sums, k, c, turn, workspace):
+    """`general_forces` from relative poses and sums over members.
+
+    Constant:
+      model: the compiled scene.
+      member_state, segment, t, q, v, tangent: as of `general_forces`.
+      rel (n_pair, POSE): relative poses of the pairs that carry more than joints.
+    In and out:
+      sums (n_pair, SUMS): of members, to which those of bushings are added.
+      workspace: the workspace, whose f is set (N, N m).
+    Out:
+      k, c (n_pair, 2 D, 2 D): on demand stiffness of the pairs, and damping where there is any.
+      turn (n, slopes): on demand slopes of the loads where they have any.
+    """
+    pair = model.pair
+    f = workspace.f
+    carries = workspace.carries
     add_bushings(model, rel, q, tangent, sums)
     f[:] = 0.0
     add_loads(model, segment, t, q, v, f)
@@ -130,8 +166,6 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
             add_pair_force(model, rel, p, sums[p], FORCE, f)
     if tangent:
         damped = workspace.switches[DAMPED] != 0
-        k = workspace.k
-        c = workspace.c
         for p in range(pair.shape[0]):
             if carries[p] != 0:
                 pair_tangent(model, p, rel, sums, damped, k, c)
@@ -139,6 +173,6 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
                 none = k[p]
                 none[:] = 0.0
         if workspace.switches[TURNING] != 0:
-            load_tangent(model, segment, t, q, v, workspace.turn)
+            load_tangent(model, segment, t, q, v, turn)
     if model.contact_pair.shape[0] > 0:
-        add_contacts(model, member_state, rel, q, v, tangent, f, workspace.k, workspace.c)
+        add_contacts(model, member_state, rel, q, v, tangent, f, k, c)

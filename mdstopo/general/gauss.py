@@ -18,7 +18,8 @@ from mdstopo.general.first_step import motion_scale
 from mdstopo.general.gauss_window import (
     COUNTS,
     MOST,
-    balance_at,
+    balance_nodes,
+    is_coupled,
     keep_nodes,
     make_nodes,
     moving,
@@ -26,7 +27,7 @@ from mdstopo.general.gauss_window import (
     spread_balance,
 )
 from mdstopo.general.generalized_alpha_step import rate_of
-from mdstopo.general.members import MODE, SET, meeting, scale_general
+from mdstopo.general.members import MODE, SET, meeting, scale_general, shortest_at_home
 from mdstopo.general.model import KIND, unpack_general
 from mdstopo.general.responses import ENERGY
 from mdstopo.general.run_start import motion_at_start
@@ -274,9 +275,19 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     if history.when.shape[0] < MOST:
         return NEEDS_ROOM, 0, t
     begin_nodes(model, v0, nodes)
-    balance_at(model, member_state, np.int64(0), t, np.int64(0), q0, rel0, workspace, history, np.int64(0), nodes, work)
+    nodes.when[0] = t
+    first = np.int64(0)
+    balance_nodes(
+        model, member_state, first, np.int64(1), np.bool_(True), q0, rel0, workspace, history, first, nodes, work
+    )
+    copy_vector(nodes.sums[0].reshape(workspace.sums.size), workspace.sums.reshape(workspace.sums.size))
+    copy_vector(history.K[0].reshape(workspace.k.size), workspace.k.reshape(workspace.k.size))
+    if is_coupled(model, workspace):
+        copy_vector(history.C[0].reshape(workspace.c.size), workspace.c.reshape(workspace.c.size))
     balanced = is_steady(model, np.int64(0))  # whether node 0 has the balance that the next prediction begins with
     motion_at_start(model, member_state, workspace, rel0, v0, scale, motion, noise)
+    shortest = np.empty(n_pair)
+    _shortest_at_start(model, rel0, shortest)
     last_time = times[times.shape[0] - 1]
     span = last_time - t
     wanted = fixed_step
@@ -330,7 +341,7 @@ def windows(model, tables, member_state, settings, most, history, work, where):
             relative_pose(model, q0, v0, after)
             for p in range(n_pair):
                 motion[p] = max(motion[p], nodes.reached[p], deflection(model, after, rel0, p))
-            if where[1] < 0:
+            if where[1] < 0 and _may_meet(shortest, motion):
                 where[1] = _meeting(model, segment, t, member_state, s, before, after, nodes)
             copy_vector(after.reshape(after.size), before.reshape(before.size))
             t = stop if lands else t + h
@@ -367,6 +378,24 @@ def _end_of_window(model, planes, s, h, nodes, end):
         end[1, d] = y
         finite = finite and np.isfinite(x) and np.isfinite(y)
     return finite
+
+
+@kernel
+def _shortest_at_start(model, rel0, shortest):
+    """shortest (n_pair,) = at most the length of each pair's shortest member at the relative poses rel0 (m)."""
+    shortest_at_home(model, shortest)
+    home = np.zeros(rel0.shape)  # nothing has changed since
+    for p in range(shortest.shape[0]):
+        shortest[p] -= deflection(model, rel0, home, p)
+
+
+@kernel
+def _may_meet(shortest, motion):
+    """Whether ends of a member may have met: not where all are longer than their pair has moved; both (n_pair,)."""
+    may = False
+    for p in range(motion.shape[0]):
+        may = may or not shortest[p] > 1.001 * motion[p]
+    return may
 
 
 @kernel
@@ -421,7 +450,9 @@ def _solve_window(
     planes = tables[level]
     copy_vector(motion, nodes.reached)
     if not balanced:
-        balance_at(model, member_state, segment, t + 0.5 * h, np.int64(0), q0, rel0, workspace, history, o, nodes, work)
+        nodes.when[0] = t + 0.5 * h
+        one = np.int64(1)
+        balance_nodes(model, member_state, segment, one, np.bool_(False), q0, rel0, workspace, history, o, nodes, work)
     predict(model, planes, h, o, history, nodes)
     turned = widest_turn(model, nodes.x[s - 1])
     if turned < 3.0:
@@ -445,8 +476,8 @@ def _solve_window(
         take_rows(nodes.y, s, nodes.ref_y)
         copy_vector(motion, nodes.reached)
         for i in range(s):
-            time = t + h * planes[0, 0, i]
-            balance_at(model, member_state, segment, time, i, q0, rel0, workspace, history, o + i, nodes, work)
+            nodes.when[i] = t + h * planes[0, 0, i]
+        balance_nodes(model, member_state, segment, s, np.bool_(False), q0, rel0, workspace, history, o, nodes, work)
         work[NEWTON] += 1
         _weigh(model, nodes.q[s - 1], nodes.rel[0], nodes.reached, noise, tolerance, scale, weights, weight)
         e = solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, 1e-3, accuracy, work)

@@ -9,7 +9,16 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.accelerations import accelerations_jvp, matrices_vjp, turns_vjp
 from mdstopo.general.gauss import TAG
-from mdstopo.general.gauss_window import COUNTS, DENSE, add_changes, fill_slopes, moving, pull_changes
+from mdstopo.general.gauss_window import (
+    COUNTS,
+    DENSE,
+    add_changes,
+    add_rate_products,
+    fill_slopes,
+    is_coupled,
+    moving,
+    pull_changes,
+)
 from mdstopo.general.method_interface import implement
 from mdstopo.general.step_history import COEFFICIENT, FIRST, U, X, Y, copy_vector
 from mdstopo.integrators.gauss_linear import _point_weights, _polynomials
@@ -379,7 +388,8 @@ def _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change
     """
     if dense.shape[2] > 0:
         add_products(dense[0], x, s, none, bar_x)
-        add_products(dense[1], x, s, none, bar_y)
+        take_rows(none, s, bar_y)
+        add_rate_products(model, dense[1], x, s, is_coupled(model, workspace), bar_y)
         return
     for i in range(s):
         pull_changes(model, workspace, history, o + i, maps[i], inverse, x[i], change, bar_x[i], bar_y[i])
@@ -448,7 +458,7 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
         integrate_to_nodes(planes[1], s, s, h, ends[0], none[0], planes[0, 0], du, by_y)
         if dense.shape[2] > 0:
             add_products(dense[0], by_x, s, given, value)
-            add_products(dense[1], by_y, s, value, value)
+            add_rate_products(model, dense[1], by_y, s, is_coupled(model, workspace), value)
         else:
             take_rows(given, s, value)
             for i in range(s):

@@ -20,12 +20,14 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import lanes, load, store
 from mdstopo.general.accelerations import accelerations_jvp, matrices_vjp, turns_vjp
-from mdstopo.general.forces import general_forces
+from mdstopo.general.forces import forces_of_sums, place_pairs
+from mdstopo.general.members import sums_at_poses
 from mdstopo.general.step_history import copy_vector
-from mdstopo.general.strides import place_of_turn
+from mdstopo.general.strides import place_of_turn, sums_size
 from mdstopo.general.structures import bundle
-from mdstopo.general.switches import DAMPED
+from mdstopo.general.switches import DAMPED, TURNING
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.rows import (
     add_products,
@@ -46,8 +48,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     rotations,
     window_accelerations,
     window_jvp,
-    window_maps,
-    window_rates,
+    window_rates_with_maps,
     window_size,
     window_slopes,
     window_state,
@@ -67,10 +68,12 @@ ROUNDING = 1e-13
 #: those about which the balance is linear, changes of x and y, coefficients, one to spare; vectors (W,): y at the
 #: start, h y, zeros. Dense slopes G_x and G_y, by columns. At nodes coordinates, velocities, accelerations, relative
 #: poses, maps (`window_maps`). Slopes before they are turned; changes (5, n) of a node's state, and of no rows of
-#: joints; inverse masses (n,), 0 of ground; how far each pair has been from its pose at the start
+#: joints; inverse masses (n,), 0 of ground; how far each pair has been from its pose at the start; at nodes the times
+#: (s) and the sums over members
 FIELDS = (
     "x", "y", "u", "g", "ref_x", "ref_y", "dx", "dy", "coef", "rest", "start", "ahead", "none", "by_x", "by_y", "q",
     "v", "a", "rel", "maps", "by_q", "by_v", "change", "row", "inverse", "reached",
+    "when", "sums",
 )  # fmt: skip
 
 
@@ -108,7 +111,8 @@ def make_nodes(model):
         vectors[1], vectors[2], dense[0], dense[1], np.zeros((MOST, model.q0.shape[0])), np.zeros((MOST, n)),
         np.zeros((MOST, n)), np.zeros((MOST, n_pair, pose_size(model))),
         np.zeros((MOST, model.home.shape[0], window_size(model))), np.zeros((size, width)), np.zeros((size, width)),
-        np.zeros((5, n)), np.zeros(model.size[0]), inverse, np.zeros(n_pair),
+        np.zeros((5, n)), np.zeros(model.size[0]), inverse, np.zeros(n_pair), np.empty(MOST),
+        np.empty((MOST, n_pair, sums_size(model))),
     )  # fmt: skip
 
 
@@ -125,40 +129,66 @@ def is_coupled(model, workspace):
 
 
 @kernel
-def balance_at(model, member_state, segment, t, i, q0, rel0, workspace, history, o, nodes, work):
-    """Balance node i at its x and y: G and its slopes, as they are there.
+def balance_nodes(model, member_state, segment, s, energies, q0, rel0, workspace, history, o, nodes, work):
+    """Balance the first nodes at their x and y, G and its slopes as they are there, in one pass over the springs.
 
     Constant:
       model: the compiled scene.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      segment, t: segment of `model.times`, and time in it (s).
+      segment, s: segment of `model.times`, and how many nodes.
+      energies: whether sums have energies and their slopes, too.
       q0 (n_q,): coordinates at the start of the window.
       rel0 (n_pair, POSE): relative poses at the start of the motion.
     In and out:
-      nodes: of node i x and y are read, and q, v, a, g, relative poses, maps and dense slopes written; how far each
-        pair has been from its start is kept.
+      nodes: of each of these nodes x, y and the time are read, and q, v, a, g, relative poses, sums, maps and dense
+        slopes written; how far each pair has been from its start is kept.
       workspace: workspace of a balance, overwritten.
-      history, o: the history of steps, where K, C and the slopes of the loads are kept as those of stage o.
+      history, o: the history of steps, where K, C and the slopes of the loads are kept as those of stages from o on.
       work (WORK,): counts of work, added to.
+    """
+    for i in range(s):
+        window_state(model, q0, nodes.x[i], nodes.y[i], nodes.q[i], nodes.v[i])
+        place_pairs(model, nodes.q[i], nodes.v[i], np.bool_(True), workspace, nodes.rel[i], nodes.sums[i])
+    sums_at_poses(model, segment, nodes.when, member_state, nodes.rel, s, energies, nodes.sums)
+    work[FORCES] += s
+    work[TANGENTS] += s
+    for i in range(s):
+        _balance(model, member_state, segment, i, rel0, workspace, history, o + i, nodes)
+
+
+@kernel
+def _balance(model, member_state, segment, i, rel0, workspace, history, o, nodes):
+    """`balance_nodes` of one node, from its relative poses and sums over members.
+
+    Constant:
+      model: the compiled scene.
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      segment, i: segment of `model.times`, and the number of the node.
+      rel0 (n_pair, POSE): relative poses at the start of the motion.
+    In and out:
+      nodes: of the node q, v, relative poses, sums and the time are read, the rest is written.
+      workspace: workspace of a balance, overwritten.
+      history, o: the history of steps, and the stage of it that is the node's.
     """
     q = nodes.q[i]
     v = nodes.v[i]
     a = nodes.a[i]
-    window_state(model, q0, nodes.x[i], nodes.y[i], q, v)
-    general_forces(model, member_state, segment, t, q, v, np.bool_(True), workspace)
-    work[FORCES] += 1
-    work[TANGENTS] += 1
+    rel = nodes.rel[i]
+    forces_of_sums(
+        model, member_state, segment, nodes.when[i], q, v, np.bool_(True), rel, nodes.sums[i], history.K[o],
+        history.C[o], history.turn[o], workspace,
+    )  # fmt: skip
     for d in range(a.shape[0]):
         a[d] = nodes.inverse[d] * workspace.f[d]
-    window_rates(model, nodes.x[i], nodes.y[i], a, nodes.g[i])
-    window_maps(model, nodes.x[i], nodes.y[i], nodes.g[i], nodes.maps[i])
-    copy_vector(workspace.k.reshape(workspace.k.size), history.K[o].reshape(workspace.k.size))
+    if workspace.switches[TURNING] == 0:
+        history.turn[o] = 0.0
     if is_coupled(model, workspace):
-        copy_vector(workspace.c.reshape(workspace.c.size), history.C[o].reshape(workspace.c.size))
-    copy_vector(workspace.turn.reshape(workspace.turn.size), history.turn[o].reshape(workspace.turn.size))
-    copy_vector(workspace.rel.reshape(workspace.rel.size), nodes.rel[i].reshape(workspace.rel.size))
+        for p in range(model.pair.shape[0]):
+            if workspace.carries[p] == 0:
+                history.C[o, p] = 0.0
+    window_rates_with_maps(model, nodes.x[i], nodes.y[i], a, nodes.g[i], nodes.maps[i])
     for p in range(model.pair.shape[0]):
-        nodes.reached[p] = max(nodes.reached[p], deflection(model, workspace.rel, rel0, p))
+        nodes.reached[p] = max(nodes.reached[p], deflection(model, rel, rel0, p))
     if is_dense(nodes):
         fill_slopes(
             model, workspace, history, o, nodes.inverse, nodes.maps[i], np.bool_(False), nodes.by_q, nodes.by_v,
@@ -184,10 +214,8 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
     coupled = is_coupled(model, workspace)
     m = by_q.shape[0]
     each = freedoms(model)
-    for d in range(m):
-        for e in range(m):
-            by_q[d, e] = 0.0
-            by_v[d, e] = 0.0
+    by_q[:] = 0.0
+    by_v[:] = 0.0
     for p in range(model.pair.shape[0]):
         for i in range(4):
             row = each * model.pair[p, i // 2]
@@ -205,10 +233,8 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
             by_v[d, place_of_turn(model, d, r - rotations(model))] += inverse[d] * turn[d, r]
     window_slopes(model, maps, coupled, by_q, by_v)
     if by_rows:
-        for d in range(m):
-            for e in range(m):
-                by_x[d, e] = by_q[d, e]
-                by_y[d, e] = by_v[d, e]
+        take_rows(by_q, np.int64(m), by_x)
+        take_rows(by_v, np.int64(m), by_y)
         return
     for d in range(m):
         for e in range(m):
@@ -228,8 +254,10 @@ def _subtract_block(inverse, k, first, second, row, column, each, out):
     """
     for r in range(each):
         w = inverse[row + r]
+        own = out[row + r]
+        given = k[first + r]
         for c in range(each):
-            out[row + r, column + c] -= w * k[first + r, second + c]
+            own[column + c] -= w * given[second + c]
 
 
 @kernel
@@ -313,6 +341,26 @@ def spread_balance(model, history, o, s, nodes):
         copy_vector(history.turn[o].reshape(history.turn[o].size), history.turn[o + i].reshape(history.turn[o].size))
 
 
+@part
+def add_rate_products(model, matrix, x, s, coupled, out):
+    """out[i] += sum_d x[i, d] matrix[i, d] for i < s, with slopes by y.
+
+    model: the compiled scene. matrix (s or more, n, W): the slopes, or their transposes.
+    x (s or more, W), s: rows, and how many.
+    coupled: whether bodies' velocities are coupled; otherwise only turning rates have slopes.
+    out (s or more, W): in and out.
+    """
+    each = freedoms(model)
+    begin = 0 if coupled else each - rotations(model)
+    for e in range(0, out.shape[1], lanes()):
+        for i in range(s):
+            y = load(out[i], e)
+            for first in range(0, matrix.shape[1], each):
+                for d in range(first + begin, first + each):
+                    y += x[i, d] * load(matrix[i, d], e)
+            store(out[i], e, y)
+
+
 @kernel
 def solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, share, accuracy, work):
     """Solve the linearised equations of a window for u at its nodes, by sweeps.
@@ -358,7 +406,7 @@ def solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, share
         subtract_rows(nodes.y, nodes.ref_y, s, nodes.dy)
         if is_dense(nodes):
             add_products(nodes.by_x, nodes.dx, s, nodes.g, nodes.u)
-            add_products(nodes.by_y, nodes.dy, s, nodes.u, nodes.u)
+            add_rate_products(model, nodes.by_y, nodes.dy, s, is_coupled(model, workspace), nodes.u)
             continue
         for i in range(s):
             copy_vector(nodes.g[i], nodes.u[i])

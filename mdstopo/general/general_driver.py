@@ -30,7 +30,7 @@ from mdstopo.general.model import COUNT, GROUP, INERTER, JOINT_FIRST, OFFSET, ST
 from mdstopo.general.quadrature_breakpoints import ROUNDS, quadrature_breakpoints, reduced
 from mdstopo.general.ready import Ready
 from mdstopo.general.responses import switches_of
-from mdstopo.general.row_gradients import RowGradients
+from mdstopo.general.row_gradients import BLOCK, RowGradients
 from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.step_history import FACTORS, GRAZES, WINDOWS, history_room
@@ -86,8 +86,11 @@ class GeneralDriver:
         self._model = model
         self._placing = Placing(case, scene.load_case, model) if case.variables else None
         self._packed = self.ints, self.floats = self.pack(model)
-        integrated = any(name in INTEGRALS for name in scene.reductions)
-        self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS, float(integrated)])
+        #: whether integrals over time are looked at
+        self._integrated = any(name in INTEGRALS for name in scene.reductions)
+        self.settings = np.array(
+            [options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS, float(self._integrated)]
+        )
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
         varied = 0 if self._placing is None else len(self._placing.initial)
@@ -96,6 +99,7 @@ class GeneralDriver:
         self._values = np.zeros(0)
         self.member_state = np.zeros((3, padded + len(model.contact_pair) + 1))
         self.padded = np.zeros(padded + varied)
+        self._swept = self.padded.reshape(1, -1)
         self.found = np.zeros(count, dtype=np.int64)
         #: how the value of every response is formed: plain, absolute, a norm (`evaluation.Peak.shape`)
         self.shapes: tuple[Shape, ...] = tuple(shape_of(model, j, name) for j, name in enumerate(scene.reductions))
@@ -192,6 +196,7 @@ class GeneralDriver:
         self.rows = np.zeros((count, most, COLUMNS))
         self._rows_of = list(self.rows)
         self.gradients = np.zeros((count, most, length))
+        self._gradients_of = list(self.gradients)
         self.across: FloatArray | None = None
 
     def _fit(self) -> None:
@@ -237,7 +242,7 @@ class GeneralDriver:
         across = self._across() if rows.cones and gradient and self._is_planar else None
         code, count, time = self.run(alpha, gradient)
         self.quadrature_breakpoints = []
-        for _ in range(ROUNDS):
+        for _ in range(ROUNDS if self._integrated else 0):
             more = quadrature_breakpoints(self, count) if code == OK else []
             if not more:
                 break
@@ -248,9 +253,13 @@ class GeneralDriver:
         if message:
             status = Status.ROTATION_JUMP
         elif code == OK:
-            for j, name in enumerate(self.scene.reductions):
-                self._look(j, name, count, gradient, window)
-            if gradient:
+            if gradient and self._plain_peaks and across is None:
+                differentiated = self._look_with_gradients(count, window)
+            else:
+                differentiated = False
+                for j, name in enumerate(self.scene.reductions):
+                    self._look(j, name, count, gradient, window)
+            if gradient and not differentiated:
                 self._row_gradients(count, across)
             status, message = self._without_value(gradient)
         grazing, meeting = self._grazing(), int(self.where[1])
@@ -323,8 +332,9 @@ class GeneralDriver:
 
     def _look(self, j: int, reduction: str, count: int, gradient: bool, window: float) -> None:
         """Rows of response j, reduced over time; of an integral the gradient, too."""
-        rows, t = self.rows[j], self.states()[0]
+        rows = self.rows[j]
         if reduction in INTEGRALS:
+            t = self.states()[0]
             total = self._integral_with_gradient(j, INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
             value, slope = reduced(reduction, total, float(t[count] - t[0]))
             rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
@@ -339,7 +349,7 @@ class GeneralDriver:
         if not competing and not switched and reduction in PEAKS:
             found = self._peaks_of_steps(j, PEAKS[reduction], count, window)
         else:
-            t = t[: count + 1].copy()
+            t = self.states()[0][: count + 1].copy()
             if switched:
                 signs = SIGNS[reduction]
                 candidates = switched_peaks(self, j, Pieces(self, j, t), signs, window)
@@ -354,6 +364,32 @@ class GeneralDriver:
         self.found[j] = found
         if reduction == "max_abs":
             rows[:found, VALUE] *= rows[:found, SIGN]
+
+    @cached_property
+    def _plain_peaks(self) -> bool:
+        """Whether all that is looked at is one response by its peaks, and their derivatives are sweeps of their own."""
+        if len(self.scene.reductions) != 1 or self.start is not None:
+            return False
+        (reduction,), model = self.scene.reductions, self.scene.model
+        plain = not compete(model.response[0, 0], reduction) and switches_of(model, 0) == 0
+        return reduction in PEAKS and plain and self.rows.shape[1] * len(self.padded) <= BLOCK
+
+    def _look_with_gradients(self, count: int, window: float) -> bool:
+        """Rows of the only response, with their gradients; False where these are still to be found."""
+        (reduction,) = self.scene.reductions
+        found, differentiated = self.ready("peaks_vjp", self.entry.peaks_vjp, *self._plain_arguments(count, window))
+        self.found[0] = found
+        if reduction == "max_abs":
+            self.rows[0, :found, VALUE] *= self.rows[0, :found, SIGN]
+        return bool(differentiated)
+
+    def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:
+        """What `peaks_vjp` takes."""
+        both = PEAKS[self.scene.reductions[0]]
+        return (
+            *self.steps_arguments(count), 0, both, self.steps_are_fine, window, self.room, self.room_ints,
+            self.member_state, self._swept, self._rows_of[0], self._gradients_of[0], self.work,
+        )  # fmt: skip
 
     def _peaks_of_steps(self, j: int, both: bool, count: int, window: float) -> int:
         """The highest peaks of response j, and where `both` are wanted of -g, into its rows; how many they are."""
@@ -494,6 +530,9 @@ class GeneralDriver:
         A process that does so beside one that compiles the steps takes half of the work from it.
         """
         entry, kinds = self.entry, set(self.scene.reductions)
+        if self._plain_peaks:
+            entry.peaks_vjp.compile(*self._plain_arguments(0, 0.0))
+            return
         if kinds - INTEGRALS.keys():
             self._row_gradients.compile()
         if kinds & PEAKS.keys():

@@ -6,8 +6,11 @@ beside it in `kinematics_interface`). A law that switches is taken in the mode t
 which neither switch nor remember, are summed as vectors.
 """
 
+import numpy as np
+
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, MEMBER_FREE_LENGTH, PAIR, ROW, START
+from mdstopo.compiler.vector import lanes, larger, largest, load, zero
+from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, MEMBER_EXCESS, MEMBER_FREE_LENGTH, PAIR, ROW, START
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import contact_start
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -19,6 +22,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     member_sums,
     second_rate,
     spring_sums,
+    spring_sums_at_poses,
 )
 from mdstopo.mechanics.laws.table import SPRING, law, law_first_set, law_has_pieces, law_remembers, law_start
 
@@ -26,6 +30,8 @@ from mdstopo.mechanics.laws.table import SPRING, law, law_first_set, law_has_pie
 #: permanent set of a law that remembers. The last column has the number of events that the modes include (`history`)
 SCALE, MODE, SET = range(3)
 
+#: share of the square of a free length that rounding may take from the square of a length at home
+SURE = 1e-12
 #: members of a group up to which steps end at the knots of their curves: a hundred would pass so many that steps
 #: would be cut to nothing
 KNOTTED = 12
@@ -87,6 +93,68 @@ def general_sums(model, segment, t, member_state, rel, tangent, sums):
                 member_sums(
                     model, code, model.law[k], lo, count, counted, t, level, member_state, rel[p], tangent, sums[p]
                 )
+
+
+@kernel
+def sums_at_poses(model, segment, when, member_state, rel, count, energies, sums):
+    """`general_sums` with tangents at several states of one segment: springs are read once for all.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      when (count or more,): times (s).
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      rel (count or more, n_pair, POSE): relative poses.
+      count: how many of them.
+      energies: whether E and E_xi are wanted.
+    Out:
+      sums (count or more, n_pair, SUMS): added to.
+    """
+    tangent = np.bool_(True)
+    for k in range(model.block.shape[0]):
+        if model.active[segment, k] != 0 and model.block[k, CODE] != INERTER:
+            p = model.block[k, PAIR]
+            code = model.block[k, CODE]
+            lo = model.block[k, START]
+            members = model.block[k, COUNT]
+            counted = energies and model.block[k, DESIGN] >= 0
+            if code == SPRING:
+                row = model.block[k, ROW]
+                spring_sums_at_poses(
+                    model, model.law[k], lo, members, row, counted, member_state, rel, p, count, tangent, sums
+                )
+                continue
+            for j in range(count):
+                level = level_of(model, segment, k, when[j])
+                member_sums(
+                    model, code, model.law[k], lo, members, counted, when[j], level, member_state, rel[j, p], tangent,
+                    sums[j, p],
+                )  # fmt: skip
+
+
+@kernel
+def shortest_at_home(model, shortest):
+    """shortest (n_pair,) = at most the length of the shortest member of each pair at home (m); infinite without one."""
+    width = model.member.shape[1]
+    rows = model.member.reshape(model.member.size)
+    free = (model.member.shape[0] + MEMBER_FREE_LENGTH) * width
+    excess = (model.member.shape[0] + MEMBER_EXCESS) * width
+    shortest[:] = np.inf
+    for k in range(model.block.shape[0]):
+        lo = model.block[k, START]
+        stop = lo + model.block[k, COUNT]
+        vectors = lo + (stop - lo) // lanes() * lanes()
+        opposite = zero() - np.inf  # of the square
+        for i in range(lo, vectors, lanes()):
+            l0 = load(rows, free + i)
+            opposite = larger((SURE - 1.0) * l0 * l0 - load(rows, excess + i), opposite)
+        most = largest(opposite)
+        for i in range(vectors, stop):
+            l0 = rows[free + i]
+            most = max(most, (SURE - 1.0) * l0 * l0 - rows[excess + i])
+        p = model.block[k, PAIR]
+        shortest[p] = min(shortest[p], np.sqrt(max(-most, 0.0)))
 
 
 @kernel
@@ -172,7 +240,7 @@ def meeting(model, segment, t, member_state, before, after):
         r = before[model.block[k, PAIR]]
         w = after[model.block[k, PAIR]]
         lo = model.block[k, START]
-        if keep_apart(model, lo, model.block[k, COUNT], r, w):
+        if keep_apart(model, lo, model.block[k, COUNT], model.block[k, ROW], r, w):
             continue
         value = level_of(model, segment, k, t)
         for i in range(lo, lo + model.block[k, COUNT]):

@@ -132,9 +132,10 @@ class GeneralModel(NamedTuple):
     size: Annotated[
         IndexArray,
         Field(
-            "6",
+            "7",
             "solved rows; half width of the band; whether anything depends on velocity; entries of the joints' own "
-            "matrix; slopes of the loads on a body; numbers of an attitude",
+            "matrix; slopes of the loads on a body; numbers of an attitude; threads that may share a pass over very "
+            "many springs, where load cases do not take them",
         ),
     ]
     row_layout: Annotated[

@@ -630,6 +630,22 @@ def peaks_of_steps(
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
     motion = finished(model, tables, member_state, history, count, work)
+    return highest(tag, motion, j, both, fine, closeness, out)
+
+
+@kernel
+def highest(tag, motion, j, both, fine, closeness, out):
+    """`peaks_of_steps` of a finished motion.
+
+    tag: the method of integration (`method_interface`).
+    motion: the motion (`dense_output.Motion`).
+    j, both, fine, closeness: as of `peaks_of_steps`.
+    out (most, COLUMNS): the rows.
+
+    Returns how many rows there are.
+    """
+    count = motion.count
+    history = motion.history
     seen = np.empty((count, SAMPLES, 3))
     plain = np.empty(count, np.int64)
     sample_steps(tag, motion, j, both, fine, closeness, seen, plain)

@@ -53,7 +53,8 @@ def wanted_rows(driver: "GeneralDriver", across: bool) -> list[WantedRow]:
         for aside in range(2 if across and driver.shapes[j] == "norm" else 1)
     ]
     wanted += [WantedRow(j, 0, 0, factor, row) for j, rows in driver.jumps.items() for factor, row in rows]
-    wanted.sort(key=lambda row: (-row.at.item(STEP), -row.at.item(FRACTION)))
+    if len(wanted) > 1:
+        wanted.sort(key=lambda row: (-row.at.item(STEP), -row.at.item(FRACTION)))
     return wanted
 
 
@@ -74,9 +75,7 @@ class RowGradients:
         array for it."""
         driver = self._driver
         wanted = wanted_rows(driver, across is not None)
-        for j, reduction in enumerate(driver.scene.reductions):
-            if reduction not in INTEGRALS:
-                driver.gradients[j, : driver.found[j]] = 0.0
+        begun: set[tuple[int, int]] = set()  # the rows that have a part of their derivative
         most = max(1, BLOCK // max(1, len(driver.padded)))
         for first in range(0, len(wanted), most):
             part = wanted[first : first + most]
@@ -92,8 +91,16 @@ class RowGradients:
                     driver.start.vjp(start, own)
                 if aside and across is not None:
                     across[j, r] += share * own
-                else:
+                elif (j, r) in begun or driver.scene.reductions[j] in INTEGRALS:
                     driver.gradients[j, r] += sign_of(driver, j, r) * share * own
+                else:
+                    np.multiply(own, sign_of(driver, j, r) * share, out=driver.gradients[j, r])
+                    begun.add((j, r))
+        for j, reduction in enumerate(driver.scene.reductions):
+            if reduction not in INTEGRALS:
+                for r in range(driver.found.item(j)):
+                    if (j, r) not in begun:  # it has no parts
+                        driver.gradients[j, r] = 0.0
 
     def compile(self) -> None:
         """Have the machine code for it on the disk."""

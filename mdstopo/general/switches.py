@@ -66,7 +66,10 @@ def carriers(model):
         found[model.bushing_pair[j]] = 1
     for j in range(model.contact_pair.shape[0]):
         found[model.contact_pair[j]] = 1
-    return found * movers(model)
+    which = movers(model)
+    for p in range(found.shape[0]):
+        found[p] *= which[p]
+    return found
 
 
 @kernel

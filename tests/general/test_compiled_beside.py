@@ -23,8 +23,14 @@ objectives:
 """
 
 
-def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch) -> None:
-    engine = Evaluator(read_case(CASE))
+#: a second objective: then all rows go through the steps in one sweep
+SECOND = "  turn: {response: {displacement: {body: rod, component: x}}, over_time: max_abs}\n"
+TOGETHER = "combine: {method: weighted_sum, weights: {tip: 1, turn: 1}}\n"
+
+
+@pytest.mark.parametrize(("more", "names"), [("", {"peaks_vjp"}), (SECOND + TOGETHER, {"rows_vjp", "peaks_of_steps"})])
+def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch, more: str, names: set[str]) -> None:
+    engine = Evaluator(read_case(CASE + more))
     driver = engine.driver("default")
     looked_for = Entry._for
     asked: list[tuple[str, str | None]] = []
@@ -37,7 +43,7 @@ def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch) -> None
     evaluating = False
     driver.compile_responses()
     compiled, asked[:] = set(asked), []
-    assert {name for name, _ in compiled} == {"rows_vjp", "peaks_of_steps"}
+    assert {name for name, _ in compiled} == names
     evaluating = True
     assert np.all(np.isfinite(engine.evaluate(engine.case.start, gradient=True).gradients["tip"]))
     assert compiled <= set(asked)

@@ -11,6 +11,7 @@ import pytest
 from mdstopo import Evaluation, evaluate
 from mdstopo.case.reader import read_case
 from mdstopo.general import compile as general_compile
+from mdstopo.mechanics.kinematics import spatial_grids
 from mdstopo.mechanics.kinematics.spatial_poses import POSE
 from mdstopo.mechanics.laws.table import SPRING
 
@@ -73,6 +74,61 @@ def test_sums_are_those_of_the_springs_one_by_one(law: str, length: int, near: f
         same(found[part], expected[part], 4e-15 * count)
     same(bare[:13], found[:13], 1e-15)
     assert not bare[13:].any()
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("tile", [(2, 16), (3, 64)])
+def test_sums_at_many_poses_are_those_at_each_whatever_the_tiles(
+    monkeypatch: pytest.MonkeyPatch, tile: tuple[int, int]
+) -> None:
+    model, states = grid(18)
+    count, p = ROWS * 18, np.array([*LAWS["damped"], 0.0, 0.0, 0.0, 0.0, 0.0])
+    states[0, START + count :] = 0.0
+    rel = np.zeros((3, 2, POSE))
+    for j in range(3):
+        rel[j, 0] = pose(model, 0.3 * (j + 1))
+    found, expected = np.zeros((2, 3, 2, SUMS))
+    for j in range(3):
+        KERNELS.spring_sums(model, p, START, count, 18, True, states, rel[j, 0], True, expected[j, 0])
+    monkeypatch.setattr(spatial_grids, "ROWS", tile[0])
+    monkeypatch.setattr(spatial_grids, "PLACES", tile[1])
+    KERNELS.spring_sums_at_poses(model, p, START, count, 18, True, states, rel, 0, 3, True, found)
+    same(found, expected, 1e-13)
+
+
+@pytest.mark.usefixtures("in_python")
+def test_springs_without_stiffness_are_summed_as_any() -> None:
+    model, states = grid(11)
+    count, r, p = ROWS * 11, pose(model, 1.0), np.array([0.0, 0.4, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    states[0, START + count :] = 0.0
+    found, expected = np.zeros((2, SUMS))
+    KERNELS.spring_sums(model, p, START, count, 11, True, states, r, True, found)
+    KERNELS.member_sums(model, SPRING, p, START, count, True, 0.0, 0.0, states, r, True, expected)
+    same(found, expected, 4e-15 * count)
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("length", LENGTHS)
+def test_ends_of_a_grid_keep_apart_where_those_of_a_block_do(length: int) -> None:
+    model, _ = grid(length)
+    count, before = ROWS * length, pose(model, 0.5)
+    shares = 0.5 + np.geomspace(1e-3, 10.0, 12)
+    apart = []
+    for share in shares:
+        after = pose(model, share)
+        apart.append(KERNELS.keep_apart(model, START, count, length, before, after))
+        moved = [KERNELS.member_motion(model, i, after)[0] for i in range(START, START + count)]
+        assert np.isfinite(moved).all()
+        lengths, ways = np.array([ends(model, i, before, after) for i in range(START, START + count)]).T
+        assert apart[-1] == bool(np.all(lengths > np.sqrt(1.001) * ways))
+    assert any(apart)
+    assert not all(apart)
+
+
+def ends(model: Any, i: int, before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
+    """The length of member i at a pose, and by how much its vector changes on the way to another one."""
+    one, two = (r[:3] + r[3:12].reshape(3, 3) @ model.member[3:6, i] - model.member[:3, i] for r in (before, after))
+    return float(np.linalg.norm(one)), float(np.linalg.norm(two - one))
 
 
 @pytest.mark.usefixtures("in_python")
@@ -162,6 +218,25 @@ def test_a_case_has_the_same_values_and_gradients_without_the_kernels_for_grids(
         assert with_rows.gradients[name] == pytest.approx(
             without.gradients[name], rel=1e-9, abs=1e-9 * np.abs(without.gradients[name]).max()
         )
+
+
+def test_a_pass_over_very_many_springs_is_the_same_with_any_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = CASE.replace("DAMPING", "free_length: 0.6").replace("count: [5, 4]", "count: [10, 10]")
+    text = text.replace("count: 21", "count: 170")  # 17,000 springs
+    text = text.replace("{end: 0.4}", "{end: 0.05}").replace("1.0e-10", "1.0e-6")
+    found = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("MDSTOPO_THREADS", threads)
+        found.append(evaluated(text))
+    monkeypatch.setattr(general_compile, "row_of", lambda *arguments, **options: (0, 0))
+    without = evaluated(text)
+    one, three = found
+    assert one.objectives == three.objectives
+    for name, value in without.objectives.items():
+        assert np.array_equal(one.gradients[name], three.gradients[name])
+        assert one.objectives[name] == pytest.approx(value, rel=1e-10)
+        most = np.abs(without.gradients[name]).max()
+        assert one.gradients[name] == pytest.approx(without.gradients[name], rel=1e-8, abs=1e-8 * most)
 
 
 @pytest.mark.parametrize("ends", ["from: low, to: posts", "from: posts, to: low"])

@@ -166,9 +166,9 @@ def test_ends_that_meet_on_the_way_are_not_far(who: int) -> None:
     near[D : D + 3] += 1e-6
     there[D : D + 3] -= x
     past[D : D + 3] -= 2.0 * x
-    assert KERNELS.keep_apart(MODEL, START, COUNT, before, near)
+    assert KERNELS.keep_apart(MODEL, START, COUNT, 0, before, near)
     for after in (there, past):
-        assert not KERNELS.keep_apart(MODEL, START, COUNT, before, after)
+        assert not KERNELS.keep_apart(MODEL, START, COUNT, 0, before, after)
         assert KERNELS.ends_meet(MODEL, i, before, past)
 
 

@@ -487,6 +487,20 @@ def window_maps(model, x, y, u, maps):
     raise NotImplementedError
 
 
+def window_rates_with_maps(model, x, y, a, u, maps):
+    """`window_rates`, and `window_maps` of what comes out.
+
+    In:
+      model: the compiled scene.
+      x, y (n - D or more,): of the window.
+      a (n,): accelerations there.
+    Out:
+      u (n - D or more,): what these make of it.
+      maps (n_body, MAPS): of each body.
+    """
+    raise NotImplementedError
+
+
 def window_jvp(model, maps, dx, dy, dq, dv, da):
     """Push changes of x and y forward, at fixed u.
 
@@ -544,7 +558,8 @@ def window_slopes(model, maps, coupled, by_x, by_y):
       maps (n_body, MAPS): of `window_maps`.
       coupled: whether accelerations depend on velocities of other bodies than their own.
     In and out:
-      by_x, by_y (n - D or more, n - D or more): rows of slopes by coordinates and velocities, then by x and y.
+      by_x, by_y (n - D or more, W): rows of slopes by coordinates and velocities, then by x and y; whole vectors
+        (`integrators.rows`), zero behind n - D, and where not coupled zero but between numbers of one body.
     """
     raise NotImplementedError
 
@@ -833,8 +848,12 @@ def add_inerter_tangents(model, pair, lo, count, inertance, member_state, q, v, 
     raise NotImplementedError
 
 
-def keep_apart(model, lo, count, before, after):
-    """Whether no member's ends can meet on a straight way between two poses (POSE,): all are longer than they move."""
+def keep_apart(model, lo, count, row, before, after):
+    """Whether no member's ends can meet on a straight way between two poses (POSE,): all are longer than they move.
+
+    model: the compiled scene. lo, count, row: the members of a block, as of `spring_sums`.
+    before, after (POSE,): the poses.
+    """
     raise NotImplementedError
 
 
@@ -872,6 +891,19 @@ def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, 
       counted, member_state, r, tangent: as of `member_sums`.
     Out:
       o (SUMS,): added to.
+    """
+    raise NotImplementedError
+
+
+def spring_sums_at_poses(model, p, start, count, row, counted, member_state, rel, pair, poses, tangent, sums):
+    """`spring_sums` at many relative poses of their pair, in one pass.
+
+    In:
+      model, p, start, count, row, counted, member_state, tangent: as of `spring_sums`.
+      rel (poses or more, n_pair, POSE): relative poses.
+      pair, poses: number of the pair, and how many poses.
+    Out:
+      sums (poses or more, n_pair, SUMS): added to.
     """
     raise NotImplementedError
 

@@ -215,6 +215,13 @@ def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, 
         add_forces((c * x, c * y, c * t, c * e), counted, o)
 
 
+@part
+def spring_sums_at_poses(model, p, start, count, row, counted, member_state, rel, pair, poses, tangent, sums):
+    """The same at many poses; see `kinematics_interface.spring_sums_at_poses`."""
+    for j in range(poses):
+        spring_sums(model, p, start, count, row, counted, member_state, rel[j, pair], tangent, sums[j, pair])
+
+
 @kernel
 def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, r, u, weight, out):
     """What members of one law add to a derivative by alpha^mu; see `kinematics_interface.member_designs`."""
@@ -296,7 +303,7 @@ def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r,
 
 
 @part
-def keep_apart(model, lo, count, before, after):
+def keep_apart(model, lo, count, row, before, after):
     """Whether no member's ends can meet between two poses; see `kinematics_interface.keep_apart`."""
     m = model.member
     return far(m.reshape(m.size), m.shape[1], lo, lo + whole_vectors(count), before, after)

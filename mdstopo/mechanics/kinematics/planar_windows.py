@@ -46,6 +46,12 @@ def window_maps(model, x, y, u, maps):
 
 
 @part
+def window_rates_with_maps(model, x, y, a, u, maps):
+    """The same numbers; see `kinematics_interface.window_rates_with_maps`."""
+    window_rates(model, x, y, a, u)
+
+
+@part
 def window_jvp(model, maps, dx, dy, dq, dv, da):
     """Changes forward; see `kinematics_interface.window_jvp`."""
     for d in range(_moving(model)):

@@ -7,21 +7,21 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.kinematics.spatial_poses import (
-    ATTITUDE,
     D_RATE,
     FREEDOMS,
     OMEGA_A,
     ROTATIONS,
-    TURN,
     TURN_A,
     D,
     S,
     W,
-    fill_attitude,
+    turn_at,
 )
 from mdstopo.mechanics.kinematics.timed import ARM, BODY, DIRECTION, KIND, PUSH, TURNS, timed_load_size
 from mdstopo.mechanics.kinematics.vectors import (
     add,
+    by_columns,
+    by_rows,
     cross,
     minus,
     plus,
@@ -70,18 +70,17 @@ def add_loads(model, segment, t, q, v, f):
         add(f, d + 3, cross(_inertia_times(model, d, omega), omega))
     if model.load_body.shape[0] == 0 and model.timed_load.shape[0] == 0:
         return
-    attitude = np.empty(ATTITUDE)
     for k in range(model.load_body.shape[0]):
-        fill_attitude(model.home, model.load_body[k], q, attitude, 0)
+        turn = turn_at(model.home, model.load_body[k], q)
         push = _load(model, segment, k, 0, tau)
         moment = _load(model, segment, k, 3, tau)
         arm = vector_at(model.load_arm[k], 0)
-        _apply(model, model.load_body[k], model.load_follows[k], arm, push, moment, attitude, f)
+        _apply(model, model.load_body[k], model.load_follows[k], arm, push, moment, turn, f)
     for k in range(model.timed_load.shape[0]):
         body = model.timed_load[k, BODY]
-        fill_attitude(model.home, body, q, attitude, 0)
+        turn = turn_at(model.home, body, q)
         arm, push, moment = _timed_load(model, segment, k, t)
-        _apply(model, body, model.timed_load[k, TURNS], arm, push, moment, attitude, f)
+        _apply(model, body, model.timed_load[k, TURNS], arm, push, moment, turn, f)
 
 
 @part
@@ -97,23 +96,23 @@ def _timed_load(model, segment, k, t):
 
 
 @part
-def _apply(model, body, follows, arm, push, moment, attitude, f):
+def _apply(model, body, follows, arm, push, moment, turn, f):
     """Add a force at a point of a body, and a moment.
 
     model: the compiled scene.
     body, follows: which, and as `load_follows`.
     arm: the point, in the body's frame (m).
     push, moment: the force (N), the moment (N m).
-    attitude (ATTITUDE,): of the body.
+    turn: rows of R of the body.
     f (n,): in and out.
     """
     d = FREEDOMS * body
     if follows == FOLLOWS:
-        add(f, d, turned(attitude, TURN, push))
+        add(f, d, by_rows(turn, push))
     else:
         add(f, d, push)
-        push = turned_back(attitude, TURN, push)
-        moment = turned_back(attitude, TURN, moment)
+        push = by_columns(turn, push)
+        moment = by_columns(turn, moment)
         if follows == ACCELERATES:
             moment = _inertia_times(model, d, moment)
     add(f, d + 3, plus(cross(arm, push), moment))
@@ -138,39 +137,38 @@ def load_tangent(model, segment, t, q, v, turn):
                 turn[d + 3 + i, ROTATIONS + c] = slope[i]
     if model.load_body.shape[0] == 0 and model.timed_load.shape[0] == 0:
         return
-    attitude = np.empty(ATTITUDE)
     for k in range(model.load_body.shape[0]):
-        fill_attitude(model.home, model.load_body[k], q, attitude, 0)
+        rows = turn_at(model.home, model.load_body[k], q)
         push = _load(model, segment, k, 0, tau)
         moment = _load(model, segment, k, 3, tau)
         arm = vector_at(model.load_arm[k], 0)
-        _add_slopes(model, model.load_body[k], model.load_follows[k], arm, push, moment, attitude, turn)
+        _add_slopes(model, model.load_body[k], model.load_follows[k], arm, push, moment, rows, turn)
     for k in range(model.timed_load.shape[0]):
         body = model.timed_load[k, BODY]
-        fill_attitude(model.home, body, q, attitude, 0)
+        rows = turn_at(model.home, body, q)
         arm, push, moment = _timed_load(model, segment, k, t)
-        _add_slopes(model, body, model.timed_load[k, TURNS], arm, push, moment, attitude, turn)
+        _add_slopes(model, body, model.timed_load[k, TURNS], arm, push, moment, rows, turn)
 
 
 @part
-def _add_slopes(model, body, follows, arm, push, moment, attitude, turn):
+def _add_slopes(model, body, follows, arm, push, moment, rows, turn):
     """Add the slopes of what `_apply` adds by the body's turn.
 
     model: the compiled scene.
     body, follows: which, and as `load_follows`.
     arm: the point, in the body's frame (m).
     push, moment: the force (N), the moment (N m).
-    attitude (ATTITUDE,): of the body.
+    rows: of R of the body.
     turn (n, 6): in and out.
     """
     d = FREEDOMS * body
     if follows != FOLLOWS:
-        push = turned_back(attitude, TURN, push)
-        moment = turned_back(attitude, TURN, moment)
+        push = by_columns(rows, push)
+        moment = by_columns(rows, moment)
     for c in range(3):
         e = unit(c)
         if follows == FOLLOWS:
-            slope = turned(attitude, TURN, cross(e, push))
+            slope = by_rows(rows, cross(e, push))
             for i in range(3):
                 turn[d + i, c] += slope[i]
             continue
@@ -195,10 +193,9 @@ def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
     if damped:
         _damped_tangent(r, o, k_out[p], c_out[p])
     else:
-        inner = np.empty((FREEDOMS, 2 * FREEDOMS))
         for i in range(FREEDOMS):
-            _times_slopes(r, vector_at(o, K + FREEDOMS * i), vector_at(o, K + FREEDOMS * i + 3), inner[i])
-        _pull_pose_back(r, inner, k_out[p])
+            _times_slopes(r, vector_at(o, K + FREEDOMS * i), vector_at(o, K + FREEDOMS * i + 3), k_out[p, i])
+        _pull_pose_back(r, k_out[p], k_out[p])
     _add_turning_of_force(r, o, k_out[p])
 
 
@@ -214,7 +211,7 @@ def _times_slopes(r, push, moment, out):
 
 @part
 def _pull_pose_back(r, inner, out):
-    """out (2 D, 2 D) = T^T inner (D, 2 D), of the pose r (POSE,), by 3 x 3 blocks."""
+    """out (2 D, 2 D) = T^T inner, of the pose r (POSE,), by 3 x 3 blocks; inner (D, 2 D) may be out's first rows."""
     for j in range(2 * FREEDOMS):
         push = (inner[0, j], inner[1, j], inner[2, j])
         moment = (inner[3, j], inner[4, j], inner[5, j])

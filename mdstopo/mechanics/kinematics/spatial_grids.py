@@ -1,12 +1,14 @@
 """Springs in space from every point of one grid to every point of another: `spatial_springs` in fewer operations.
 
 Members lie in rows: those of one row begin at one point P, and those of one column end at one point Q. With c = p - d
-of a row, r = a - c; a force along r has the lever a x n = c x n, and a change of length sees a - r = c as well:
+of a row, r = a - c, and a change of length sees a - r = c: Delta' = n . (d' + w x c). In a column a stays, so
 
-    Delta' = n . (d' + w x c),   b = (n, c x n),   sum w a = sum w r + W c,   M = (sum w a) (-c)^T,
+    b = (n, a x n),   sum w a = W a,   M = a (sum w r - W a)^T,
 
-with w, W, g and M of `spatial_springs`. So of a row's members only W, sum w r = sum f n, and the six numbers of
-G = sum g n n^T are summed; and a with what it has changed by since home is found once for each column.
+with w, W, g and M of `spatial_springs`: of a column's members only W, sum w r = sum f n and the six numbers of
+G = sum g n n^T are summed, of which the trace, sum g, spares one; and a with what it has changed by since home is found
+once. A vector of columns stays at hand over all rows of a tile, which stays in the first-level cache while many poses
+pass over it. All is summed in units of the stiffness k, which is not zero.
 
 Arguments: member (8 M,), the rows of `GeneralModel.member` behind each other, width M of each; start, count: the first
 member, and how many there are, without padding; length: members of a row, at least as many as a vector has; r (POSE,):
@@ -17,29 +19,45 @@ has summed count as 0.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.vector import inverse_root, lanes, load, store, total, unmarked, where_larger, zero
+from mdstopo.compiler.threads import shared, taken
+from mdstopo.compiler.vector import (
+    inverse_root,
+    lanes,
+    larger,
+    largest,
+    load,
+    store,
+    total,
+    unmarked,
+    where_larger,
+    zero,
+)
+from mdstopo.mechanics.grids import PLACES
 from mdstopo.mechanics.kinematics.spatial_forces import K
 from mdstopo.mechanics.kinematics.spatial_poses import D_RATE, D_SINCE, FREEDOMS, S_SINCE, D, S, W
-from mdstopo.mechanics.kinematics.spatial_springs import ENERGY, EXCESS, L0, PULL, P, Q
-from mdstopo.mechanics.kinematics.vectors import add, cross, dot, minus, plus, times, turned, vector_at
+from mdstopo.mechanics.kinematics.spatial_springs import (
+    ENERGY,
+    EXCESS,
+    L0,
+    PULL,
+    P,
+    Q,
+    add_coupling,
+    add_symmetric,
+    add_totals,
+)
+from mdstopo.mechanics.kinematics.vectors import cross, dot, minus, plus, put, times, turned, vector_at
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
+from mdstopo.scene.model import MANY
 
+#: rows of a tile, where a grid has so many
+ROWS = 32
 #: numbers kept of a column at a pose: a, 2 u and u^2, where u is what a + d has changed by since home
 SEEN = 7
-
-
-@part
-def _vectors_of(length):
-    """How many vectors a row has."""
-    return (length + lanes() - 1) // lanes()
-
-
-@part
-def _place(v, length):
-    """The first column of vector v of a row, and a bit for each of its lanes that belongs to the vector before."""
-    first = v * lanes()
-    at = min(first, length - lanes())
-    return at, (1 << (first - at)) - 1
+#: the place of the threads that may share a pass in `GeneralModel.size`
+THREADS = 6
+#: members times poses from which on threads are worth making
+WORTH = 200_000
 
 
 @part
@@ -49,163 +67,249 @@ def _rows(x, width, first, i):
 
 
 @kernel
-def begin_columns(member, width, start, length, r, room):
-    """Find a, 2 u and u^2 of each column at a pose.
+def grid_sums(member, width, scale, start, count, length, p, rel, pair, poses, counted, tangent, threads, sums):
+    """Add forces, energy and on demand the tangent K, but for what damping does to it, to the sums of a pair at poses.
 
     In:
-      member, width, start, length, r: as above.
+      member, width, start, count, length: as above.
+      scale (M or more,): alpha^mu of each member.
+      p (3 or more,): k, c, preload; k is not zero.
+      rel (poses or more, n_pair, POSE): relative poses.
+      pair: number of the pair.
+      poses: how many of them.
+      counted: whether E and E_xi are wanted.
+      tangent: whether K is wanted.
+      threads: that may share the tiles; no result depends on it.
     Out:
-      room (SEEN length,): what is found, one after the other.
+      sums (poses or more, n_pair, SUMS): Q, and on demand E, E_xi and K, added to.
     """
-    for v in range(_vectors_of(length)):
-        i, _ = _place(v, length)
+    rows = count // length
+    if count < MANY:
+        _sum_rows(
+            member, width, scale, start, length, p, rel, pair, poses, counted, tangent, np.int64(0), rows,
+            _tile(rows, length), sums, pair,
+        )  # fmt: skip
+        return
+    tall, _ = _tile(rows, length)
+    parts = np.zeros(((rows + tall - 1) // tall, poses, 1, sums.shape[2]))
+    counter = np.zeros(1, np.int64)
+    job = (counter, member, width, scale, start, count, length, p, rel, pair, poses, counted, tangent, parts)
+    shared(_sum_tiles, threads if count * poses >= WORTH else np.int64(1), job)
+    for i in range(parts.shape[0]):
+        for j in range(poses):
+            for s in range(sums.shape[2]):
+                sums[j, pair, s] += parts[i, j, 0, s]
+
+
+@part
+def _tile(rows, length):
+    """Rows and columns of a tile of a grid with so many rows, each of so many members: high, because what a column
+    adds is as much work as some three of its members."""
+    tall = rows if rows * length <= PLACES else min(rows, ROWS)
+    return tall, min(length, PLACES // tall // lanes() * lanes())
+
+
+@kernel
+def _sum_tiles(counter, member, width, scale, start, count, length, p, rel, pair, poses, counted, tangent, parts):
+    """Sum row of tiles after row of tiles, each by itself, until none is left: what each thread does.
+
+    In:
+      counter (1,): how many some thread has taken so far; counted on.
+      member, width, scale, start, count, length, p, rel, pair, poses, counted, tangent: as of `grid_sums`.
+    Out:
+      parts (tiles, poses, 1, SUMS): sums of each.
+    """
+    rows = count // length
+    tile = _tile(rows, length)
+    i = taken(counter)
+    while i < parts.shape[0]:
+        _sum_rows(
+            member, width, scale, start, length, p, rel, pair, poses, counted, tangent, i * tile[0],
+            min((i + 1) * tile[0], rows), tile, parts[i], np.int64(0),
+        )  # fmt: skip
+        i = taken(counter)
+
+
+@kernel
+def _sum_rows(
+    member, width, scale, start, length, p, rel, pair, poses, counted, tangent, first_row, last_row, tile, sums, column
+):
+    """`grid_sums` of the rows from first_row to before last_row, tile by tile.
+
+    In:
+      member, width, scale, start, length, p, rel, pair, poses, counted, tangent: as of `grid_sums`.
+      first_row, last_row: numbers of rows.
+      tile: of `_tile`.
+      column: where in the second axis of sums the pair is.
+    Out:
+      sums (poses or more, columns, SUMS): added to.
+    """
+    tall, wide = tile
+    room = np.empty((tall, 6))
+    for row in range(first_row, last_row, tall):
+        own = room[: min(tall, last_row - row)]
+        for first in range(0, length, wide):
+            last = min(first + wide, length)
+            for j in range(poses):
+                _sum_tile(
+                    member, width, scale, start, row, first, last, length, p, rel[j, pair], counted, tangent, own,
+                    sums[j, column],
+                )  # fmt: skip
+
+
+@part
+def _begin_rows(member, width, start, row, length, r, moving, room):
+    """Find c of rows (m) and on demand d' + w x c (m/s).
+
+    member, width, start, length, r: as above. row: number of the first row.
+    moving: whether the second is wanted.
+    room (rows, 6): out.
+    """
+    origin = vector_at(r, D)
+    for j in range(room.shape[0]):
+        at = start + (row + j) * length
+        c = minus((member[P * width + at], member[(P + 1) * width + at], member[(P + 2) * width + at]), origin)
+        put(room[j], 0, c)
+        if moving:
+            put(room[j], 3, plus(vector_at(r, D_RATE), cross(vector_at(r, W), c)))
+
+
+@part
+def _sum_tile(member, width, scale, start, row, first, last, length, p, r, counted, tangent, room, o):
+    """`grid_sums` of a tile at one pose.
+
+    In:
+      member, width, scale, start, length, p, r, counted, tangent: as of `grid_sums`.
+      row: number of the tile's first row.
+      first, last: its columns.
+    Out:
+      o (SUMS,): added to.
+      room (rows, 6): scratch.
+    """
+    elastic_alone = p[1] == 0.0 and p[2] == 0.0
+    _begin_rows(member, width, start, row, length, r, not elastic_alone, room)
+    damping = p[1] / p[0]
+    preload = p[2] / p[0]
+    none = zero(), zero(), zero()
+    energy = zero()
+    force = none, none
+    slope = none, none
+    stiffness = none, none, (none, none, none), (none, none, none)
+    for begin in range(first, last, lanes()):
+        i = min(begin, length - lanes())
+        done = (1 << (begin - i)) - 1
         q = _rows(member, width, Q, start + i)
         a = turned(r, S, q)
         u = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, q))
-        twice = plus(u, u)
-        store(room, i, a[0])
-        store(room, length + i, a[1])
-        store(room, 2 * length + i, a[2])
-        store(room, 3 * length + i, twice[0])
-        store(room, 4 * length + i, twice[1])
-        store(room, 5 * length + i, twice[2])
-        store(room, 6 * length + i, dot(u, u))
-
-
-@part
-def _seen(room, length, i, c):
-    """r, L^2 and 1/L of the members of a row from column i on."""
-    x = minus(_rows(room, length, 0, i), c)
-    square = dot(x, x)
-    return x, square, inverse_root(square, ZERO_LENGTH_SQUARED)
-
-
-@part
-def _stretch(room, length, i, x, square, y, free, excess):
-    """Delta = L - l0 of these members (m), as `spatial_springs` has it.
-
-    room (SEEN length,), length, i: of `begin_columns`, the members of a row, and the column from which on.
-    x, square, y: r, its square and 1/L (m, m^2, 1/m). free, excess: l0 (m) and L0^2 - l0^2 (m^2).
-    """
-    moved = load(room, 6 * length + i)
-    stretch = square * y - free
-    squares = (excess - moved) + dot(_rows(room, length, 3, i), x)
-    off = 0.5 * y * (stretch * (square * y + free) - squares)
-    return stretch - where_larger(square - moved, 0.0, off)
-
-
-@kernel
-def grid_sums(member, width, scale, start, count, length, p, r, counted, tangent, o):
-    """Add forces, energy and on demand the tangent K, but for what damping does to it, to the sums of the pair.
-
-    In:
-      member, width, start, count, length, r: as above.
-      scale (M or more,): alpha^mu of each member.
-      p (3 or more,): k, c, preload.
-      counted: whether E and E_xi are wanted.
-      tangent: whether K is wanted.
-    Out:
-      o (SUMS,): Q, and on demand E, E_xi and K, added to.
-    """
-    room = np.empty(SEEN * length)
-    begin_columns(member, width, start, length, r, room)
-    elastic_alone = p[1] == 0.0 and p[2] == 0.0
-    energy = zero()
-    for row in range(start, start + count, length):
-        p_row = member[P * width + row], member[(P + 1) * width + row], member[(P + 2) * width + row]
-        c = minus(p_row, vector_at(r, D))
-        speed = plus(vector_at(r, D_RATE), cross(vector_at(r, W), c))
-        push = zero(), zero(), zero()
-        pull = zero(), zero(), zero()
+        moved = plus(u, u), dot(u, u)
+        push = none
+        pull = none
         weight = zero()
-        diagonal = zero(), zero(), zero()
-        others = zero(), zero(), zero()
-        for v in range(_vectors_of(length)):
-            i, done = _place(v, length)
-            at = row + i
-            x, square, y = _seen(room, length, i, c)
-            stretch = _stretch(
-                room, length, i, x, square, y, load(member, L0 * width + at), load(member, EXCESS * width + at)
-            )
+        trace = zero()
+        two = zero(), zero()
+        others = none
+        at = start + row * length + i
+        for j in range(room.shape[0]):
+            x = minus(a, vector_at(room[j], 0))
+            square = dot(x, x)
+            y = inverse_root(square, ZERO_LENGTH_SQUARED)
+            stretch = _stretch(moved, x, square, y, load(member, L0 * width + at), load(member, EXCESS * width + at))
             s = unmarked(load(scale, at), done)
-            elastic = p[0] * s * stretch
-            force = elastic
+            elastic = s * stretch
+            w = elastic * y
+            if counted:
+                energy = energy + where_larger(square, ZERO_LENGTH_SQUARED, elastic * stretch)
             if not elastic_alone:
-                force = elastic + s * (p[2] + p[1] * (y * dot(x, speed)))
-                pull = plus(pull, times(elastic * y, x))
-            w = force * y
+                pull = plus(pull, times(w, x))
+                w = w + s * (preload + damping * (y * dot(x, vector_at(room[j], 3)))) * y
             push = plus(push, times(w, x))
-            energy = energy + where_larger(square, ZERO_LENGTH_SQUARED, elastic * stretch)
             if tangent:
                 weight = weight + w
-                n = times(y, x)
-                g = times(p[0] * s - w, n)
-                diagonal = diagonal[0] + g[0] * n[0], diagonal[1] + g[1] * n[1], diagonal[2] + g[2] * n[2]
-                others = others[0] + g[1] * n[2], others[1] + g[2] * n[0], others[2] + g[0] * n[1]
-        own = _total(push)
-        add(o, 0, times(-1.0, own))
-        add(o, 3, cross(own, c))
-        if counted:
-            elastic_own = own if elastic_alone else _total(pull)
-            add(o, PULL, elastic_own)
-            add(o, PULL + 3, cross(c, elastic_own))
+                g = s - w
+                trace = trace + where_larger(square, ZERO_LENGTH_SQUARED, g)
+                along = times(g * (y * y), x)
+                two = two[0] + along[0] * x[0], two[1] + along[1] * x[1]
+                others = others[0] + along[1] * x[2], others[1] + along[2] * x[0], others[2] + along[0] * x[1]
+            at += length
+        force = plus(force[0], push), plus(force[1], cross(a, push))
+        if not elastic_alone:
+            slope = plus(slope[0], pull), plus(slope[1], cross(a, pull))
         if tangent:
-            _add_row(c, total(weight), own, _total(diagonal), _total(others), o)
+            diagonal = two[0], two[1], trace - two[0] - two[1]
+            stiffness = _add_column(stiffness, a, weight, push, diagonal, others)
+    add_totals(o, 0, force[0], -p[0])
+    add_totals(o, 3, force[1], -p[0])
     if counted:
-        o[ENERGY] += 0.5 * total(energy)
+        if elastic_alone:
+            slope = force
+        o[ENERGY] += 0.5 * p[0] * total(energy)
+        add_totals(o, PULL, slope[0], p[0])
+        add_totals(o, PULL + 3, slope[1], p[0])
+    if tangent:
+        _add_stiffness(stiffness, p[0], o)
 
 
 @part
-def _total(x):
-    """The sums over the lanes of three vectors."""
-    return total(x[0]), total(x[1]), total(x[2])
+def _stretch(moved, x, square, y, free, excess):
+    """Delta = L - l0 of members of one row (m), as `spatial_springs` has it.
 
-
-@part
-def _add_row(c, w, push, diagonal, others, o):
-    """Add K of a row to the sums of the pair.
-
-    In:
-      c: p - d (m).
-      w, push: W (N/m) and sum w r (N).
-      diagonal, others: of G (N/m) xx, yy, zz, and yz, zx, xy.
-    Out:
-      o (SUMS,): K added to.
+    moved: 2 u and u^2 of their columns, where u is what a + d has changed by since home (m, m^2).
+    x, square, y: r, its square and 1/L (m, m^2, 1/m). free, excess: l0 (m) and L0^2 - l0^2 (m^2).
     """
-    xx, yy, zz = diagonal
-    yz, zx, xy = others
-    g0 = xx, xy, zx
-    g1 = xy, yy, yz
-    g2 = zx, yz, zz
-    # rows of sum g n (c x n)^T, then of sum g (c x n)(c x n)^T
-    b0 = cross(c, g0)
-    b1 = cross(c, g1)
-    b2 = cross(c, g2)
-    t0 = minus(times(c[1], b2), times(c[2], b1))
-    t1 = minus(times(c[2], b0), times(c[0], b2))
-    t2 = minus(times(c[0], b1), times(c[1], b0))
-    a = plus(push, times(w, c))
-    trace = dot(a, c)
-    _add_halves(o, 0, (g0[0] + w, g0[1], g0[2]), (b0[0], b0[1] + a[2], b0[2] - a[1]))
-    _add_halves(o, 1, (g1[0], g1[1] + w, g1[2]), (b1[0] - a[2], b1[1], b1[2] + a[0]))
-    _add_halves(o, 2, (g2[0], g2[1], g2[2] + w), (b2[0] + a[1], b2[1] - a[0], b2[2]))
-    m0 = minus(t0, times(a[0], c))
-    m1 = minus(t1, times(a[1], c))
-    m2 = minus(t2, times(a[2], c))
-    _add_halves(o, 3, (b0[0], b1[0] - a[2], b2[0] + a[1]), (m0[0] + trace, m0[1], m0[2]))
-    _add_halves(o, 4, (b0[1] + a[2], b1[1], b2[1] - a[0]), (m1[0], m1[1] + trace, m1[2]))
-    _add_halves(o, 5, (b0[2] - a[1], b1[2] + a[0], b2[2]), (m2[0], m2[1], m2[2] + trace))
+    long = square * y
+    stretch = long - free
+    squares = (excess - moved[1]) + dot(moved[0], x)
+    off = 0.5 * y * (stretch * (long + free) - squares)
+    return stretch - where_larger(square - moved[1], 0.0, off)
 
 
 @part
-def _add_halves(o, i, by_shift, by_turn):
-    """Add row i of K: its slopes by shifts and by turns."""
-    add(o, K + FREEDOMS * i, by_shift)
-    add(o, K + FREEDOMS * i + 3, by_turn)
+def _add_column(sums, a, w, push, diagonal, others):
+    """Sums of K with those of columns more: shifts by shifts (xx, yy, zz and yz, zx, xy), by turns, turns by turns.
+
+    sums: so far, rows of the last two. a: the arms (m). w, push: W (N/m) and sum w r (N).
+    diagonal, others: of G (N/m) xx, yy, zz, and yz, zx, xy.
+    """
+    by_shift, across, by_turn, turns = sums
+    yz, zx, xy = others
+    # rows of sum g n (a x n)^T, then of sum g (a x n)(a x n)^T
+    b0 = cross(a, (diagonal[0], xy, zx))
+    b1 = cross(a, (xy, diagonal[1], yz))
+    b2 = cross(a, (zx, yz, diagonal[2]))
+    t0 = minus(times(a[1], b2), times(a[2], b1))
+    t1 = minus(times(a[2], b0), times(a[0], b2))
+    t2 = minus(times(a[0], b1), times(a[1], b0))
+    h = times(w, a)
+    c = minus(h, push)
+    trace = dot(a, c)
+    return (
+        (by_shift[0] + (diagonal[0] + w), by_shift[1] + (diagonal[1] + w), by_shift[2] + (diagonal[2] + w)),
+        plus(across, others),
+        (
+            plus(by_turn[0], (b0[0], b0[1] + h[2], b0[2] - h[1])),
+            plus(by_turn[1], (b1[0] - h[2], b1[1], b1[2] + h[0])),
+            plus(by_turn[2], (b2[0] + h[1], b2[1] - h[0], b2[2])),
+        ),
+        (
+            plus(turns[0], minus((t0[0] + trace, t0[1], t0[2]), times(a[0], c))),
+            plus(turns[1], minus((t1[0], t1[1] + trace, t1[2]), times(a[1], c))),
+            plus(turns[2], minus((t2[0], t2[1], t2[2] + trace), times(a[2], c))),
+        ),
+    )
+
+
+@part
+def _add_stiffness(sums, k, o):
+    """Add k times the sums of K, vectors as of `_add_column`, to o (SUMS,)."""
+    diagonal, others, by_turn, turns = sums
+    add_symmetric(o, 0, times(k, diagonal), times(k, others))
+    for i in range(3):
+        add_coupling(o, i, times(k, by_turn[i]))
+        add_totals(o, K + FREEDOMS * (3 + i) + 3, turns[i], k)
 
 
 @kernel
-def grid_designs(member, width, start, count, length, k, rel, u, pair, out):
+def grid_designs(member, width, start, count, length, k, rel, u, pair, threads, out):
     """Add sum_j f (b . u_j) over S poses of each spring, without damping and preload, at alpha^mu = 1.
 
     In:
@@ -214,32 +318,118 @@ def grid_designs(member, width, start, count, length, k, rel, u, pair, out):
       rel (S, n_pair, POSE): relative poses.
       u (S, n_pair, D): virtual changes of these.
       pair: number of the pair.
+      threads: that may share the tiles.
     Out:
       out (M or more,): added to.
     """
+    counter = np.zeros(1, np.int64)
+    if count < MANY or count * rel.shape[0] < WORTH:
+        _design_tiles(counter, member, width, start, count, length, k, rel, u, pair, out)
+        return
+    shared(_design_tiles, threads, (counter, member, width, start, count, length, k, rel, u, pair, out))
+
+
+@kernel
+def _design_tiles(counter, member, width, start, count, length, k, rel, u, pair, out):
+    """`grid_designs` of row of tiles after row of tiles, until none is left: what each thread does.
+
+    In:
+      counter (1,): how many some thread has taken so far; counted on.
+      member, width, start, count, length, k, rel, u, pair: as of `grid_designs`.
+    Out:
+      out (M or more,): added to.
+    """
+    rows = count // length
+    tall, _ = _tile(rows, length)
     poses = rel.shape[0]
-    room = np.empty((poses, SEEN * length))
-    fixed = np.empty((poses, 6))  # c, and the change of d + a that the change of a pose makes along r
-    for j in range(poses):
-        begin_columns(member, width, start, length, rel[j, pair], room[j])
-    for row in range(start, start + count, length):
-        p = member[P * width + row], member[(P + 1) * width + row], member[(P + 2) * width + row]
-        for j in range(poses):
-            c = minus(p, vector_at(rel[j, pair], D))
-            move = plus(vector_at(u[j, pair], 0), cross(vector_at(u[j, pair], 3), c))
-            fixed[j, 0] = c[0]
-            fixed[j, 1] = c[1]
-            fixed[j, 2] = c[2]
-            fixed[j, 3] = move[0]
-            fixed[j, 4] = move[1]
-            fixed[j, 5] = move[2]
-        for v in range(_vectors_of(length)):
-            i, done = _place(v, length)
-            free = load(member, L0 * width + row + i)
-            excess = load(member, EXCESS * width + row + i)
-            work = zero()
-            for j in range(poses):
-                x, square, y = _seen(room[j], length, i, vector_at(fixed[j], 0))
-                stretch = _stretch(room[j], length, i, x, square, y, free, excess)
-                work = work + stretch * y * dot(x, vector_at(fixed[j], 3))
-            store(out, row + i, load(out, row + i) + k * unmarked(work, done))
+    seen = np.empty((poses, SEEN, lanes()))
+    room = np.empty((tall, poses, 6))
+    i = taken(counter)
+    while i * tall < rows:
+        row = i * tall
+        own = room[: min(tall, rows - row)]
+        _begin_designs(member, width, start, row, length, rel, u, pair, own)
+        for begin in range(0, length, lanes()):
+            _design_columns(member, width, start, row, begin, length, k, rel, pair, own, seen, out)
+        i = taken(counter)
+
+
+@part
+def _begin_designs(member, width, start, row, length, rel, u, pair, room):
+    """Find c of rows, and by what u changes d + a along r (m).
+
+    member, width, start, length, rel, u, pair: as of `grid_designs`. row: number of the first row.
+    room (rows, S, 6): out.
+    """
+    for j in range(room.shape[0]):
+        at = start + (row + j) * length
+        p = member[P * width + at], member[(P + 1) * width + at], member[(P + 2) * width + at]
+        for m in range(room.shape[1]):
+            c = minus(p, vector_at(rel[m, pair], D))
+            put(room[j, m], 0, c)
+            put(room[j, m], 3, plus(vector_at(u[m, pair], 0), cross(vector_at(u[m, pair], 3), c)))
+
+
+@part
+def _design_columns(member, width, start, row, begin, length, k, rel, pair, room, seen, out):
+    """`grid_designs` of a vector of columns of a tile.
+
+    In:
+      member, width, start, length, k, rel, pair: as of `grid_designs`.
+      row: number of the tile's first row.
+      begin: the first column.
+      room (rows, S, 6): of `_begin_designs`.
+    Out:
+      out (M or more,): added to.
+      seen (S, SEEN, lanes): scratch: a, 2 u and u^2 of the columns at the poses.
+    """
+    i = min(begin, length - lanes())
+    done = (1 << (begin - i)) - 1
+    q = _rows(member, width, Q, start + i)
+    for m in range(seen.shape[0]):
+        r = rel[m, pair]
+        a = turned(r, S, q)
+        moved = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, q))
+        twice = plus(moved, moved)
+        own = seen[m]
+        for c in range(3):
+            store(own[c], 0, a[c])
+            store(own[3 + c], 0, twice[c])
+        store(own[6], 0, dot(moved, moved))
+    at = start + row * length + i
+    for j in range(room.shape[0]):
+        free = load(member, L0 * width + at)
+        excess = load(member, EXCESS * width + at)
+        work = zero()
+        for m in range(seen.shape[0]):
+            own = seen[m]
+            x = minus((load(own[0], 0), load(own[1], 0), load(own[2], 0)), vector_at(room[j, m], 0))
+            moved = (load(own[3], 0), load(own[4], 0), load(own[5], 0)), load(own[6], 0)
+            square = dot(x, x)
+            y = inverse_root(square, ZERO_LENGTH_SQUARED)
+            stretch = _stretch(moved, x, square, y, free, excess)
+            work = work + stretch * y * dot(x, vector_at(room[j, m], 3))
+        store(out, at, load(out, at) + k * unmarked(work, done))
+        at += length
+
+
+@kernel
+def grid_far(member, width, start, count, length, before, after):
+    """`spatial_springs.far` of a grid: an end moves against the other as all those of its column do.
+
+    member, width, start, count, length: as above. before, after (POSE,): the relative poses.
+    """
+    rows = count // length
+    room = np.empty((rows, 6))
+    _begin_rows(member, width, start, np.int64(0), length, before, np.bool_(False), room)
+    shift = minus(vector_at(after, D), vector_at(before, D))
+    near = zero() - np.inf
+    for begin in range(0, length, lanes()):
+        q = _rows(member, width, Q, start + min(begin, length - lanes()))
+        a = turned(before, S, q)
+        moved = plus(minus(turned(after, S, q), a), shift)
+        most = 1.001 * dot(moved, moved)
+        for j in range(rows):
+            x = minus(a, vector_at(room[j], 0))
+            near = larger(most - dot(x, x), near)
+    return largest(near) < -ZERO_LENGTH_SQUARED

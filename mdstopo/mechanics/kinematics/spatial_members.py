@@ -17,7 +17,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.padding import whole_vectors
 from mdstopo.mechanics.kinematics.spatial_forces import C, K
-from mdstopo.mechanics.kinematics.spatial_grids import grid_designs, grid_sums
+from mdstopo.mechanics.kinematics.spatial_grids import THREADS, grid_designs, grid_far, grid_sums
 from mdstopo.mechanics.kinematics.spatial_lines import (
     NO_LENGTH,
     add_line_stiffness,
@@ -73,6 +73,7 @@ from mdstopo.mechanics.kinematics.vectors import (
 )
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.mechanics.laws.table import SPRING, law, law_is_idle
+from mdstopo.scene.model import MANY
 
 
 @part
@@ -217,18 +218,34 @@ def _add_tangent(e, arm, lever, y, speed, rate, w, f, fd, fr, o):
 @kernel
 def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, o):
     """Forces, energy and tangents of springs; see `kinematics_interface.spring_sums`."""
+    rel = r.reshape((1, 1, r.shape[0]))
+    sums = o.reshape((1, 1, o.shape[0]))
+    zero = np.int64(0)
+    spring_sums_at_poses(
+        model, p, start, count, row, counted, member_state, rel, zero, np.int64(1), np.bool_(tangent), sums
+    )
+
+
+@kernel
+def spring_sums_at_poses(model, p, start, count, row, counted, member_state, rel, pair, poses, tangent, sums):
+    """The same at many poses; see `kinematics_interface.spring_sums_at_poses`."""
     stop = start + whole_vectors(count)
     width = model.member.shape[1]
     rows = model.member.reshape(model.member.size)
     scale = member_state.reshape(member_state.size)
-    if row > 0:
-        grid_sums(rows, width, scale, start, count, row, p, r, counted, tangent, o)
-    else:
-        alike_sums(rows, width, scale, start, stop, p, r, counted, o)
-        if tangent:
-            alike_tangent(rows, width, scale, start, stop, p, r, o)
-    if tangent and p[1] != 0.0:
-        alike_damping(rows, width, scale, start, stop, p, r, o)
+    grid = row > 0 and p[0] != 0.0
+    if grid:
+        threads = model.size[THREADS] if count >= MANY else np.int64(1)
+        grid_sums(rows, width, scale, start, count, row, p, rel, pair, poses, np.bool_(counted), tangent, threads, sums)
+    for j in range(poses):
+        r = rel[j, pair]
+        o = sums[j, pair]
+        if not grid:
+            alike_sums(rows, width, scale, start, stop, p, r, counted, o)
+            if tangent:
+                alike_tangent(rows, width, scale, start, stop, p, r, o)
+        if tangent and p[1] != 0.0:
+            alike_damping(rows, width, scale, start, stop, p, r, o)
 
 
 @kernel
@@ -257,7 +274,8 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     rows = model.member.reshape(model.member.size)
     width = model.member.shape[1]
     if row > 0:
-        grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, out)
+        threads = model.size[THREADS] if count >= MANY else np.int64(1)
+        grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, threads, out)
     else:
         elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
 
@@ -309,9 +327,11 @@ def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r,
 
 
 @part
-def keep_apart(model, lo, count, before, after):
+def keep_apart(model, lo, count, row, before, after):
     """Whether no member's ends can meet between two poses; see `kinematics_interface.keep_apart`."""
     rows = model.member.reshape(model.member.size)
+    if row > 0:
+        return grid_far(rows, model.member.shape[1], lo, count, row, before, after)
     return far(rows, model.member.shape[1], lo, lo + whole_vectors(count), before, after)
 
 

@@ -43,25 +43,45 @@ POSE = 42
 def fill_attitude(home, body, q, out, at):
     """The attitude of a body, ATTITUDE numbers from place `at` of `out` on.
 
-    With e = (w, u), E - I = 2 w [u] + 2 [u]^2 has no difference of large numbers.
-
     home (n_body, HOME): bodies at home. body: its number. q (n_q,): coordinates.
+    """
+    h = home[body]
+    first, second, third = _turned_since(h, body, q)
+    for c in range(3):
+        since = first if c == 0 else second if c == 1 else third
+        for r in range(3):
+            out[at + TURN_SINCE + 3 * r + c] = since[r]
+            out[at + TURN + 3 * r + c] = h[HOME_TURN + 3 * r + c] + since[r]
+
+
+@part
+def _turned_since(h, body, q):
+    """The columns of R_home (E - I) of a body; with e = (w, u), E - I = 2 w [u] + 2 [u]^2 has no difference of large
+    numbers.
+
+    h (HOME,): the body at home. body: its number. q (n_q,): coordinates.
     """
     b = COORDINATES * body + 3
     w = q[b]
     x = q[b + 1]
     y = q[b + 2]
     z = q[b + 3]
-    h = home[body]
-    # the columns of E - I
     first = (-2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
     second = (2.0 * (x * y - w * z), -2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
     third = (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), -2.0 * (x * x + y * y))
-    for c in range(3):
-        since = turned(h, HOME_TURN, first if c == 0 else second if c == 1 else third)
-        for r in range(3):
-            out[at + TURN_SINCE + 3 * r + c] = since[r]
-            out[at + TURN + 3 * r + c] = h[HOME_TURN + 3 * r + c] + since[r]
+    return turned(h, HOME_TURN, first), turned(h, HOME_TURN, second), turned(h, HOME_TURN, third)
+
+
+@part
+def turn_at(home, body, q):
+    """The rows of R of a body, as vectors; home, body, q: as of `fill_attitude`."""
+    h = home[body]
+    a, b, c = _turned_since(h, body, q)
+    return (
+        (h[HOME_TURN] + a[0], h[HOME_TURN + 1] + b[0], h[HOME_TURN + 2] + c[0]),
+        (h[HOME_TURN + 3] + a[1], h[HOME_TURN + 4] + b[1], h[HOME_TURN + 5] + c[1]),
+        (h[HOME_TURN + 6] + a[2], h[HOME_TURN + 7] + b[2], h[HOME_TURN + 8] + c[2]),
+    )
 
 
 @kernel

@@ -89,7 +89,7 @@ def _none():
 
 
 @part
-def _add_totals(o, i, a, sign):
+def add_totals(o, i, a, sign):
     """o[i : i + 3] += sign times the sums over the lanes of a."""
     o[i] += sign * total(a[0])
     o[i + 1] += sign * total(a[1])
@@ -124,12 +124,12 @@ def alike_sums(member, width, scale, start, stop, p, r, counted, o):
             force = times(elastic, n)
             pull = plus(pull, force)
             pull_moment = plus(pull_moment, cross(arm, force))
-    _add_totals(o, 0, push, -1.0)
-    _add_totals(o, 3, moment, -1.0)
+    add_totals(o, 0, push, -1.0)
+    add_totals(o, 3, moment, -1.0)
     if counted:
         o[ENERGY] += 0.5 * total(energy)
-        _add_totals(o, PULL, pull, 1.0)
-        _add_totals(o, PULL + 3, pull_moment, 1.0)
+        add_totals(o, PULL, pull, 1.0)
+        add_totals(o, PULL + 3, pull_moment, 1.0)
 
 
 @kernel
@@ -177,22 +177,22 @@ def alike_tangent(member, width, scale, start, stop, p, r, o):
         m0 = plus(m0, times(wa[0], h))
         m1 = plus(m1, times(wa[1], h))
         m2 = plus(m2, times(wa[2], h))
-    _add_symmetric(o, 0, shifts, across)
-    _add_symmetric(o, 3, turns, around)
-    _add_coupling(o, 0, by0)
-    _add_coupling(o, 1, by1)
-    _add_coupling(o, 2, by2)
+    add_symmetric(o, 0, shifts, across)
+    add_symmetric(o, 3, turns, around)
+    add_coupling(o, 0, by0)
+    add_coupling(o, 1, by1)
+    add_coupling(o, 2, by2)
     _add_geometric(o, total(sum_w), (total(sum_wa[0]), total(sum_wa[1]), total(sum_wa[2])))
-    _add_totals(o, K + FREEDOMS * 3 + 3, m0, 1.0)
-    _add_totals(o, K + FREEDOMS * 4 + 3, m1, 1.0)
-    _add_totals(o, K + FREEDOMS * 5 + 3, m2, 1.0)
+    add_totals(o, K + FREEDOMS * 3 + 3, m0, 1.0)
+    add_totals(o, K + FREEDOMS * 4 + 3, m1, 1.0)
+    add_totals(o, K + FREEDOMS * 5 + 3, m2, 1.0)
     trace = total(m0[0] + m1[1] + m2[2])
     for j in range(3, FREEDOMS):
         o[K + FREEDOMS * j + j] -= trace
 
 
 @part
-def _add_symmetric(o, first, diagonal, others):
+def add_symmetric(o, first, diagonal, others):
     """Add a symmetric block to K that begins at column `first`: its diagonal, and yz, zx, xy."""
     at = K + FREEDOMS * first + first
     yz = total(others[0])
@@ -210,7 +210,7 @@ def _add_symmetric(o, first, diagonal, others):
 
 
 @part
-def _add_coupling(o, i, row):
+def add_coupling(o, i, row):
     """Add row i of a block of shifts by turns to K, and its mirror image."""
     for_turn = total(row[0]), total(row[1]), total(row[2])
     for j in range(3):
@@ -259,8 +259,8 @@ def alike_damping(member, width, scale, start, stop, p, r, o):
             turn = plus(turn, times(along, by_turn))
             shift_c = plus(shift_c, times(along, n))
             turn_c = plus(turn_c, times(along, lever))
-        _add_totals(o, K + FREEDOMS * j, shift, 1.0)
-        _add_totals(o, K + FREEDOMS * j + 3, turn, 1.0)
+        add_totals(o, K + FREEDOMS * j, shift, 1.0)
+        add_totals(o, K + FREEDOMS * j + 3, turn, 1.0)
         column = total(shift_c[0]), total(shift_c[1]), total(shift_c[2])
         other = total(turn_c[0]), total(turn_c[1]), total(turn_c[2])
         for i in range(j + 1):

@@ -18,6 +18,7 @@ f1 and f2 are sums of their series, right to rounding up to 2 rad and to 1e-13 a
 import math
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import lanes, load, store
 from mdstopo.mechanics.kinematics.rotations import quaternion_at, turn_by
 from mdstopo.mechanics.kinematics.spatial_poses import COORDINATES, FREEDOMS
 from mdstopo.mechanics.kinematics.spatial_steps import back_turned, put_quaternion
@@ -28,6 +29,7 @@ from mdstopo.mechanics.kinematics.vectors import (
     minus,
     plus,
     put,
+    row_of,
     times,
     turned,
     turned_back,
@@ -125,10 +127,29 @@ def window_rates(model, x, y, a, u):
     for body in range(_moving(model)):
         d = FREEDOMS * body
         t = vector_at(x, d + 3)
-        _, f2, df1, df2, _, _, beta = _weights(dot(t, t))
         put(u, d, vector_at(a, d))
-        rest = minus(vector_at(a, d + 3), _excess(t, vector_at(y, d + 3), f2, df1, df2))
-        put(u, d + 3, _back(t, rest, beta))
+        put(u, d + 3, _turning(t, vector_at(y, d + 3), vector_at(a, d + 3), _weights(dot(t, t))))
+
+
+@part
+def _turning(t, p, push, weights):
+    """theta'' from theta, theta', omega' and the weights f1, ... at theta."""
+    _, f2, df1, df2, _, _, beta = weights
+    return _back(t, minus(push, _excess(t, p, f2, df1, df2)), beta)
+
+
+@kernel
+def window_rates_with_maps(model, x, y, a, u, maps):
+    """Both from the same weights; see `kinematics_interface.window_rates_with_maps`."""
+    for body in range(_moving(model)):
+        d = FREEDOMS * body
+        t = vector_at(x, d + 3)
+        p = vector_at(y, d + 3)
+        weights = _weights(dot(t, t))
+        w = _turning(t, p, vector_at(a, d + 3), weights)
+        put(u, d, vector_at(a, d))
+        put(u, d + 3, w)
+        _fill_maps(t, p, w, weights, maps[body])
 
 
 @part
@@ -156,7 +177,16 @@ def _fill(m, at, scale, turn, one, first, two, second):
 
 @kernel
 def window_maps(model, x, y, u, maps):
-    """J, J^-1, H, L and N of each body; see `kinematics_interface.window_maps`.
+    """J, J^-1, H, L and N of each body; see `kinematics_interface.window_maps`."""
+    for body in range(_moving(model)):
+        d = FREEDOMS * body
+        t = vector_at(x, d + 3)
+        _fill_maps(t, vector_at(y, d + 3), vector_at(u, d + 3), _weights(dot(t, t)), maps[body])
+
+
+@part
+def _fill_maps(t, p, w, weights, m):
+    """m (MAPS,): J, J^-1, H, L and N of a body with theta = t, theta' = p, theta'' = w and the weights f1, ... at t.
 
     H is the slope of J p at fixed p; L that of J u + E; with z = theta x u, tau = theta . u, h as g with z for y, and
     k = -f1'' y + f2'' theta x y:
@@ -167,32 +197,26 @@ def window_maps(model, x, y, u, maps):
             + (2 f2' (p x y - sigma p) + 4 sigma k + 2 h - f2 u) theta^T
     """
     none = (0.0, 0.0, 0.0)
-    for body in range(_moving(model)):
-        d = FREEDOMS * body
-        m = maps[body]
-        t = vector_at(x, d + 3)
-        p = vector_at(y, d + 3)
-        w = vector_at(u, d + 3)
-        s = dot(t, t)
-        f1, f2, df1, df2, ddf1, ddf2, beta = _weights(s)
-        sigma = dot(t, p)
-        c = cross(t, p)
-        cc = cross(t, c)
-        z = cross(t, w)
-        g = minus(times(df2, cc), times(df1, c))
-        k = minus(times(ddf2, cc), times(ddf1, c))
-        h = minus(times(df2, cross(t, z)), times(df1, z))
-        slope = minus(times(2.0, g), times(f2, p))
-        _fill(m, J, 1.0 - f2 * s, times(-f1, t), times(f2, t), t, none, none)
-        _fill(m, INVERSE, 1.0 - beta * s, times(0.5, t), times(beta, t), t, none, none)
-        _fill(m, H, f2 * sigma, minus(times(f1, p), times(f2, c)), slope, t, none, none)
-        turn = minus(times(-f2, c), times(2.0 * sigma * df1, t))
-        _fill(m, N, -(f2 + 2.0 * s * df2) * sigma, turn, times(f2, t), p, times(2.0, plus(g, times(sigma * df2, t))), t)
-        turn = plus(times(2.0 * sigma, minus(times(df1, p), times(df2, c))), minus(times(f1, w), times(f2, z)))
-        along = plus(times(2.0 * df2, minus(cross(p, c), times(sigma, p))), times(4.0 * sigma, k))
-        along = plus(along, minus(times(2.0, h), times(f2, w)))
-        scale = f2 * (dot(p, p) + dot(t, w)) + 2.0 * sigma * sigma * df2
-        _fill(m, L, scale, turn, slope, p, along, t)
+    s = dot(t, t)
+    f1, f2, df1, df2, ddf1, ddf2, beta = weights
+    sigma = dot(t, p)
+    c = cross(t, p)
+    cc = cross(t, c)
+    z = cross(t, w)
+    g = minus(times(df2, cc), times(df1, c))
+    k = minus(times(ddf2, cc), times(ddf1, c))
+    h = minus(times(df2, cross(t, z)), times(df1, z))
+    slope = minus(times(2.0, g), times(f2, p))
+    _fill(m, J, 1.0 - f2 * s, times(-f1, t), times(f2, t), t, none, none)
+    _fill(m, INVERSE, 1.0 - beta * s, times(0.5, t), times(beta, t), t, none, none)
+    _fill(m, H, f2 * sigma, minus(times(f1, p), times(f2, c)), slope, t, none, none)
+    turn = minus(times(-f2, c), times(2.0 * sigma * df1, t))
+    _fill(m, N, -(f2 + 2.0 * s * df2) * sigma, turn, times(f2, t), p, times(2.0, plus(g, times(sigma * df2, t))), t)
+    turn = plus(times(2.0 * sigma, minus(times(df1, p), times(df2, c))), minus(times(f1, w), times(f2, z)))
+    along = plus(times(2.0 * df2, minus(cross(p, c), times(sigma, p))), times(4.0 * sigma, k))
+    along = plus(along, minus(times(2.0, h), times(f2, w)))
+    scale = f2 * (dot(p, p) + dot(t, w)) + 2.0 * sigma * sigma * df2
+    _fill(m, L, scale, turn, slope, p, along, t)
 
 
 @kernel
@@ -276,15 +300,18 @@ def window_slopes(model, maps, coupled, by_x, by_y):
             for c in range(3):
                 by_x[d + r, d + c] -= m[L + 3 * r + c]
                 by_y[d + r, d + c] -= m[N + 3 * r + c]
-        for c in range(FREEDOMS * bodies):
-            put_column(by_x, d, c, turned(m, INVERSE, (by_x[d, c], by_x[d + 1, c], by_x[d + 2, c])))
-            if coupled or (d <= c < d + 3):
-                put_column(by_y, d, c, turned(m, INVERSE, (by_y[d, c], by_y[d + 1, c], by_y[d + 2, c])))
+        _turn_rows(m, by_x[d], by_x[d + 1], by_x[d + 2])
+        _turn_rows(m, by_y[d], by_y[d + 1], by_y[d + 2])
 
 
 @part
-def put_column(m, r, c, a):
-    """m[r : r + 3, c] = a."""
-    m[r, c] = a[0]
-    m[r + 1, c] = a[1]
-    m[r + 2, c] = a[2]
+def _turn_rows(m, x, y, z):
+    """Three rows (W,) become T^-1 times these, whole vectors at a time; m (MAPS,): of a body."""
+    first = row_of(m, INVERSE, 0)
+    second = row_of(m, INVERSE, 1)
+    third = row_of(m, INVERSE, 2)
+    for c in range(0, x.shape[0], lanes()):
+        column = load(x, c), load(y, c), load(z, c)
+        store(x, c, dot(first, column))
+        store(y, c, dot(second, column))
+        store(z, c, dot(third, column))

@@ -87,6 +87,22 @@ def turned_back(m, i, a):
 
 
 @part
+def by_rows(m, a):
+    """R a for a matrix R of which m has the rows, as vectors."""
+    return dot(m[0], a), dot(m[1], a), dot(m[2], a)
+
+
+@part
+def by_columns(m, a):
+    """R^T a for a matrix R of which m has the rows, as vectors."""
+    return (
+        m[0][0] * a[0] + m[1][0] * a[1] + m[2][0] * a[2],
+        m[0][1] * a[0] + m[1][1] * a[1] + m[2][1] * a[2],
+        m[0][2] * a[0] + m[1][2] * a[1] + m[2][2] * a[2],
+    )
+
+
+@part
 def row_of(m, i, k):
     """Row k of the matrix at place i of m."""
     return m[i + 3 * k], m[i + 3 * k + 1], m[i + 3 * k + 2]
