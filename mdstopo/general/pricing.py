@@ -87,7 +87,7 @@ def asked_of(driver: "GeneralDriver", factor: FloatArray) -> AskedOfMembers:
     pose = np.zeros((states, len(pairs), size.pose_size))
     change, pose_a = np.zeros((2, states, len(pairs), each))
     energy, when, segment = np.zeros(states), np.zeros(states), np.full(states, -1)
-    scratch = np.zeros((max(len(asked.rows), 1), len(driver.padded)))
+    scratch = np.zeros((1, len(driver.padded)))
     arguments: tuple[Any, ...] = (
         *driver.steps_arguments(count)[:4], driver.limits, count, *asked, np.array(list(pairs), dtype=np.int64),
         driver.room, driver.room_ints, driver.member_state, scratch, pose, change, pose_a, energy, when, segment,
