@@ -78,7 +78,7 @@ def ask_members(
         second derivatives in time.
       energy (T,), when (T,), segment (T,): weight of the stored energy; time (s), and the segment of it, which is not
         touched where there is no state.
-      padded (R or 1, M_padded + P): scratch.
+      padded (1, M_padded + P): scratch.
       work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
@@ -175,7 +175,8 @@ def _ask_rows(
     tag, model, tables, member_state, history, count, which, rows, factor, workspace, pairs, states, change, energy,
     padded, work,
 ):  # fmt: skip
-    """What rows ask, as `ask_members` has it; `row_sweep.rows_gradients` with what it goes through written down.
+    """What rows ask, as `ask_members` has it: the sum of their cotangents, each with its weight from where the row
+    begins, goes back through the steps.
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
@@ -191,25 +192,26 @@ def _ask_rows(
     Out:
       states: poses, second derivatives, times and segments. change (T, G, D), energy (T,): added to.
       workspace: workspace of a balance (`accelerations.Workspace`).
-      padded (R, M_padded + P): scratch. work (WORK,): counts of work, added to.
+      padded (1, M_padded + P): scratch. work (WORK,): counts of work, added to.
     """
     n = model.mass.shape[0]
     total = rows.shape[0]
     stages = history.index[count, FIRST]
+    scratch = padded[:1]
     bars = np.empty((3, n))
-    bar_set = np.zeros((total, count_sets(model)))
-    lam_q = np.zeros((total, n))
-    lam_v = np.zeros((total, n))
-    lam_x = np.zeros((total, 2, n))
+    # of each row, then, in the last line, of all that have begun
+    bar_set = np.zeros((total + 1, count_sets(model)))
+    lam_q = np.zeros((total + 1, n))
+    lam_v = np.zeros((total + 1, n))
+    lam_x = np.zeros((total + 1, 2, n))
     begins = np.empty(total, np.int64)
-    fraction = np.ones(total)
-    z = np.empty((total, MOST_STAGES, n))
+    fraction = np.ones(total + 1)
+    z = np.empty((1, MOST_STAGES, n))
     y = np.empty(model.size[0])
-    weighed = np.empty(n)
     for m in range(total):
         w, fraction[m] = row_cotangents(
             tag, model, tables, member_state, history, count, which[m, 0], rows[m], np.bool_(False), workspace, bars,
-            bar_set[m], padded[m], work,
+            bar_set[m], scratch[0], work,
         )  # fmt: skip
         lam_q[m] = bars[0]
         lam_v[m] = bars[1]
@@ -218,42 +220,55 @@ def _ask_rows(
             tag, model, tables, member_state, history, count, which[m, 0], rows[m], workspace, pairs, states, at,
             bars[2], factor[m], change[at], work,
         )  # fmt: skip
-        if w > count:
+        begins[m] = w
+        if w > count or fraction[m] < 1.0:
             own = slice(m, m + 1)
             first = history.index[w, FIRST]
-            used = history.index[w + 1, FIRST] - first
-            before = step_of_rows(
+            begins[m] = step_of_rows(
                 tag, model, tables, member_state, history, count, w, fraction[own], lam_q[own], lam_v[own], lam_x[own],
-                bar_set[own], z[own], y, workspace, padded[own], work,
+                bar_set[own], z, y, workspace, scratch, work,
             )  # fmt: skip
-            for j in range(used):
-                _keep_stage(model, history, first + j, history.index[w, SEGMENT], pairs, states, at + 1 + j)
-                _add_change(
-                    model, history.stage_q[first + j], history.stage_v[first + j], z[m, j], factor[m], pairs,
-                    change[at + 1 + j],
-                )  # fmt: skip
-            w = before
-        begins[m] = w
+            if w > count:
+                for j in range(history.index[w + 1, FIRST] - first):
+                    _keep_stage(model, history, first + j, history.index[w, SEGMENT], pairs, states, at + 1 + j)
+            to = at + 1 if w > count else first
+            _add_changes(model, history, w, z[0], factor[m], pairs, change[to:])
     w = begins[0]
-    active = 0
+    joined = 0
+    every = slice(total, total + 1)
     while w >= 0:
-        while active < total and begins[active] >= w:
-            active += 1
-        first = history.index[w, FIRST]
-        used = history.index[w + 1, FIRST] - first
+        while joined < total and begins[joined] >= w:
+            _add_row(factor[joined], lam_q[joined], lam_q[total])
+            _add_row(factor[joined], lam_v[joined], lam_v[total])
+            for carried in range(2):
+                _add_row(factor[joined], lam_x[joined, carried], lam_x[total, carried])
+            _add_row(factor[joined], bar_set[joined], bar_set[total])
+            joined += 1
         before = step_of_rows(
-            tag, model, tables, member_state, history, count, w, fraction[:active], lam_q[:active], lam_v[:active],
-            lam_x[:active], bar_set[:active], z[:active], y, workspace, padded[:active], work,
+            tag, model, tables, member_state, history, count, w, fraction[every], lam_q[every], lam_v[every],
+            lam_x[every], bar_set[every], z, y, workspace, scratch, work,
         )  # fmt: skip
-        for j in range(used):
-            weighed[:] = 0.0
-            for m in range(active):
-                for d in range(n):
-                    weighed[d] += factor[m] * z[m, j, d]
-            _add_change(
-                model, history.stage_q[first + j], history.stage_v[first + j], weighed, 1.0, pairs, change[first + j]
-            )
+        _add_changes(model, history, w, z[0], 1.0, pairs, change[history.index[w, FIRST] :])
         w = before
+
+
+@part
+def _add_row(factor, x, out):
+    """out += factor x."""
+    for i in range(out.shape[0]):
+        out[i] += factor * x[i]
+
+
+@kernel
+def _add_changes(model, history, w, z, factor, pairs, out):
+    """`_add_change` at the stages of step w: z (s or more, n) the virtual displacements there, out (s or more, G, D).
+
+    model, history: the compiled scene, and the history of steps (`StepHistory`).
+    factor, pairs (G,): as of `_add_change`.
+    """
+    first = history.index[w, FIRST]
+    for j in range(history.index[w + 1, FIRST] - first):
+        _add_change(model, history.stage_q[first + j], history.stage_v[first + j], z[j], factor, pairs, out[j])
 
 
 @kernel

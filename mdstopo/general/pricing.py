@@ -87,7 +87,7 @@ def pricing_states_of(driver: "GeneralDriver", factor: FloatArray) -> PricingSta
     pose = np.zeros((n_state, len(pairs), size.pose_size))
     change, pose_a = np.zeros((2, n_state, len(pairs), each))
     energy, when, segment = np.zeros(n_state), np.zeros(n_state), np.full(n_state, -1)
-    scratch = np.zeros((max(len(chosen.rows), 1), len(driver.padded)))
+    scratch = np.zeros((1, len(driver.padded)))
     arguments: tuple[Any, ...] = (
         *driver.steps_arguments(count)[:4], driver.limits, count, *chosen, np.array(list(pairs), dtype=np.int64),
         driver.room, driver.room_ints, driver.member_state, scratch, pose, change, pose_a, energy, when, segment,

@@ -2,22 +2,63 @@
 
 All rows go through the steps together, so what a step needs (tangents, factors, the members' forces and directions) is
 read or formed once for all of them; each row joins at its own step. A point inside a step that needs a step of its own
-(`method_interface`) is gone through by its row alone before it joins. The arithmetic of each row is what it is alone.
+(`method_interface`) is gone through by its row alone before it joins.
+
+A step is linear in the cotangents. Where there are more rows than free coordinates and velocities, these go through it
+one by one, as unit cotangents, and each row is the sum of what became of them: however many rows there are, a step
+costs what so few do.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.adjoint import apply_saltation_transposed, row_cotangents
 from mdstopo.general.gather import add_designs
 from mdstopo.general.members import unscale_general
-from mdstopo.general.method_interface import step_back
+from mdstopo.general.method_interface import is_explicit, step_back
 from mdstopo.general.model import unpack_general
 from mdstopo.general.parameters import add_times
 from mdstopo.general.permanent_sets import add_sets_of_rows, count_sets, keep_start
 from mdstopo.general.row_design import add_designs_of_rows
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, restore_modes
+from mdstopo.scene.model import FloatArray, IndexArray
+
+
+class Units(NamedTuple):
+    """What unit cotangents go through a step with, U of them: twice as many as there are free coordinates.
+
+    place (U / 2,): the free coordinates. lam_q, lam_v (U, n), lam_x (U, 2, n), bar_set (U, slots), z (U, 17, n),
+    out (U, M_padded + P), fraction (U,): as of `through_step`.
+    """
+
+    place: IndexArray
+    lam_q: FloatArray
+    lam_v: FloatArray
+    lam_x: FloatArray
+    bar_set: FloatArray
+    z: FloatArray
+    out: FloatArray
+    fraction: FloatArray
+
+
+@kernel
+def make_units(model, columns):
+    """Arrays for unit cotangents; columns: M_padded + P."""
+    n = model.mass.shape[0]
+    place = np.empty(n, np.int64)
+    free = 0
+    for d in range(n):
+        if model.free[d] != 0:
+            place[free] = d
+            free += 1
+    many = 2 * free
+    return Units(
+        place[:free], np.empty((many, n)), np.empty((many, n)), np.zeros((many, 2, n)),
+        np.empty((many, count_sets(model))), np.empty((many, 17, n)), np.empty((many, columns)), np.ones(many),
+    )  # fmt: skip
 
 
 @kernel
@@ -50,9 +91,27 @@ def step_of_rows(
 
     Returns the number of the step before, or -1.
     """
+    through_step(
+        tag, model, tables, member_state, history, w, c, lam_q, lam_v, lam_x, bar_set, z, y, workspace, out, work
+    )
+    before_step(model, history, member_state, count, w, lam_q, lam_v, bar_set, out)
+    for m in range(c.shape[0]):
+        c[m] = 1.0
+    return history.index[w, PARENT]
+
+
+@kernel
+def through_step(
+    tag, model, tables, member_state, history, w, c, lam_q, lam_v, lam_x, bar_set, z, y, workspace, out, work
+):
+    """Pull the cotangents of R rows through one step back to its start, behind the events there.
+
+    tag, model, tables, history, w, c, lam_q, lam_v, lam_x, z, y, workspace, work: as of `step_of_rows`; c stays.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member; modes become the step's.
+    bar_set (R, slots), out (R, M_padded + P): added to.
+    """
     none = np.empty((0, 3, lam_q.shape[1]))
     no_rows = np.empty((0, model.size[0]))
-    no_drops = np.empty(0)
     o = history.index[w, FIRST]
     stages = history.index[w + 1, FIRST] - o
     segment = history.index[w, SEGMENT]
@@ -62,10 +121,21 @@ def step_of_rows(
         add_designs(model, segment, history, o, member_state, z[0, :stages], out[0], work)
     else:
         add_designs_of_rows(model, segment, history, o, stages, member_state, z, out, work)
-    before = history.index[w, PARENT]
     if bar_set.shape[1] > 0:
         for j in range(stages):
             add_sets_of_rows(model, segment, member_state, history, o + j, z, j, bar_set)
+
+
+@kernel
+def before_step(model, history, member_state, count, w, lam_q, lam_v, bar_set, out):
+    """Pull the cotangents of R rows at the start of step w back to before the events there.
+
+    model, history, count, w: the compiled scene, the history of steps, how many there are, the number of the step.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member; modes may change.
+    lam_q, lam_v (R, n), bar_set (R, slots), out (R, M_padded + P): in place, as of `step_of_rows`.
+    """
+    no_drops = np.empty(0)
+    before = history.index[w, PARENT]
     for m in range(lam_q.shape[0]):
         if model.varied.shape[0] > 0:
             add_times(
@@ -75,8 +145,52 @@ def step_of_rows(
             apply_saltation_transposed(
                 model, history, before + 1, lam_q[m], lam_v[m], bar_set[m], no_drops, member_state, out[m]
             )
-        c[m] = 1.0
-    return before
+
+
+@kernel
+def through_step_by_units(
+    tag, model, tables, member_state, history, w, lam_q, lam_v, bar_set, units, y, workspace, out, work
+):
+    """`through_step` of whole steps for many rows, by unit cotangents; of methods that carry nothing else.
+
+    tag, model, tables, history, w, y, workspace, work: as of `step_of_rows`.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member; modes become the step's.
+    lam_q, lam_v (R, n), bar_set (R, slots), out (R, M_padded + P): in place, as of `step_of_rows`.
+    units: overwritten.
+    """
+    free = units.place.shape[0]
+    units.lam_q[:] = 0.0
+    units.lam_v[:] = 0.0
+    units.bar_set[:] = 0.0
+    units.out[:] = 0.0
+    for k in range(free):
+        units.lam_q[k, units.place[k]] = 1.0
+        units.lam_v[free + k, units.place[k]] = 1.0
+    through_step(
+        tag, model, tables, member_state, history, w, units.fraction, units.lam_q, units.lam_v, units.lam_x,
+        units.bar_set, units.z, y, workspace, units.out, work,
+    )  # fmt: skip
+    share = np.empty(2 * free)
+    for m in range(lam_q.shape[0]):
+        for k in range(free):
+            d = units.place[k]
+            share[k] = lam_q[m, d]
+            share[free + k] = lam_v[m, d]
+            lam_q[m, d] = 0.0
+            lam_v[m, d] = 0.0
+        for k in range(2 * free):
+            if share[k] != 0.0:
+                add_share(share[k], units.lam_q[k], lam_q[m])
+                add_share(share[k], units.lam_v[k], lam_v[m])
+                add_share(share[k], units.bar_set[k], bar_set[m])
+                add_share(share[k], units.out[k], out[m])
+
+
+@part
+def add_share(share, x, out):
+    """out += share x."""
+    for i in range(out.shape[0]):
+        out[i] += share * x[i]
 
 
 @kernel
@@ -126,11 +240,22 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
                 bar_set[own], z[own], y, workspace, out[own], work,
             )  # fmt: skip
         begins[m] = w
+    units = make_units(model, out.shape[1])
     w = begins[0] if total > 0 else -1
     active = 0
     while w >= 0:
         while active < total and begins[active] >= w:
             active += 1
+        if is_explicit(tag) and active > units.fraction.shape[0] > 0:
+            through_step_by_units(
+                tag, model, tables, member_state, history, w, lam_q[:active], lam_v[:active], bar_set[:active], units,
+                y, workspace, out[:active], work,
+            )  # fmt: skip
+            before_step(
+                model, history, member_state, count, w, lam_q[:active], lam_v[:active], bar_set[:active], out[:active]
+            )
+            w = history.index[w, PARENT]
+            continue
         w = step_of_rows(
             tag, model, tables, member_state, history, count, w, fraction[:active], lam_q[:active], lam_v[:active],
             lam_x[:active], bar_set[:active], z[:active], y, workspace, out[:active], work,

@@ -150,21 +150,16 @@ class Bundle:
         """The last one of rows that are the same within SAME."""
         if len(self) < 2:
             return self
-        steepest = self.steepest
-        values, kept = self.values(), np.ones(len(self), dtype=np.bool_)
+        steepest, values = self.steepest, self.values()
         # slopes that are the same have nearly the same sum: most pairs need no look at all their entries
         total = np.zeros(len(self)) if isinstance(self.slope, Stack) else np.einsum("rn->r", self.slope)
-        apart = 2.0 * SAME * self.slope.shape[1] * steepest
-        for i in range(len(self) - 1):
-            near = np.flatnonzero(
-                (self.group[i + 1 :] == self.group[i])
-                & (np.abs(values[i + 1 :] - values[i]) <= SAME * max(steepest[i], 1e-300))
-                & (np.abs(total[i + 1 :] - total[i]) <= apart[i])
-            )
-            for k in (near + i + 1).tolist():
-                if alike(self.slope, k, i, SAME * steepest[i]):
-                    kept[i] = False
-                    break
+        near = self.group[:, None] == self.group
+        near &= np.abs(values - values[:, None]) <= (SAME * np.maximum(steepest, 1e-300))[:, None]
+        near &= np.abs(total - total[:, None]) <= (2.0 * SAME * self.slope.shape[1] * steepest)[:, None]
+        kept = np.ones(len(self), dtype=np.bool_)
+        for i, k in np.argwhere(np.triu(near, 1)).tolist():
+            if kept[i] and alike(self.slope, k, i, SAME * steepest[i]):
+                kept[i] = False
         return self if kept.all() else self.subset(kept)
 
     def thinned(self) -> "Bundle":

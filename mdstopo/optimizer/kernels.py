@@ -102,13 +102,15 @@ def _function_row(
 
 
 @member_kernel
-def _add(total: Floats, weight: float, row: Floats) -> None:
-    for i in range(len(row)):
+def add(total: Floats, weight: float, row: Floats) -> None:
+    """total += weight * row, of the first one's length."""
+    for i in range(len(total)):
         total[i] += weight * row[i]
 
 
 @member_kernel
-def _dot(a: Floats, b: Floats) -> float:
+def dot(a: Floats, b: Floats) -> float:
+    """The inner product of two vectors, of the first one's length."""
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]
@@ -191,8 +193,8 @@ def expand(
             if a < R:
                 values[a] += _function_row(F[a, start:stop], dual[a], low, high, row, g, diagonal)
             else:
-                values[a] += _dot(row, v)
-                _add(g, dual[a], row)
+                values[a] += dot(row, v)
+                add(g, dual[a], row)
         for i in range(n):
             gap += ml[i] * bl[i] + mu[i] * bu[i]
             worst = max(worst, abs(g[i] - ml[i] + mu[i]))
@@ -231,7 +233,7 @@ def direct(B: Floats, change: Floats, bounds: Floats, work: Floats) -> tuple[flo
         for i in range(len(d)):
             d[i] = g[i]
         for a in range(K):
-            _add(d, -change[a], B[a, start:stop])
+            add(d, -change[a], B[a, start:stop])
         for i in range(len(d)):
             d[i] *= inv[i]
             lower = d[i] / bl[i]

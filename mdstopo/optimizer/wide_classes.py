@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, member_kernel, vector_entry
 from mdstopo.compiler.threads import shared, taken
-from mdstopo.optimizer.kernels import _add, _dot, _dot3
+from mdstopo.optimizer.kernels import _dot3, add, dot
 from mdstopo.optimizer.problem import Bools, Floats, Ints
 from mdstopo.optimizer.wide_passes import PIECE, part, pieces
 
@@ -183,7 +183,7 @@ def _sorted(
                     inside += 1
             for a in range(len(rows)):
                 row, column = pool[rows[a], start:stop], columns[a, :inside]
-                sums[piece, a] += _dot(row, r[:n])
+                sums[piece, a] += dot(row, r[:n])
                 for k in range(inside):
                     column[k] = row[which[k]]
                 for b in range(a + 1 if inside > 0 else 0):
@@ -295,7 +295,7 @@ def _finished(
                 y[i] = min(max(at[i] + step, first[i]), last[i])
                 r[i] = step
             for a in range(R):
-                sums[piece, a] += _dot(pool[rows[a], start:stop], r[:n])
+                sums[piece, a] += dot(pool[rows[a], start:stop], r[:n])
             sums[piece, R] += _dot3(h[:n], r[:n], r[:n])
         counts[piece] = place - piece * PIECE
         piece = taken(counter)
@@ -399,7 +399,7 @@ def _grams(counter: Ints, pool: Floats, rows: Ints, unit: Floats, products: Floa
                 one = pool[rows[a], start:stop]
                 for b in range(a + 1):
                     other = pool[rows[b], start:stop]
-                    products[piece, 0, a, b] += _dot(one, other)
+                    products[piece, 0, a, b] += dot(one, other)
                     products[piece, 1, a, b] += _dot3(one, other, weight[: stop - start])
                     products[piece, 0, b, a] = products[piece, 0, a, b]
                     products[piece, 1, b, a] = products[piece, 1, a, b]
@@ -422,5 +422,5 @@ def _combined(counter: Ints, pool: Floats, rows: Ints, theta: Floats, out: Float
             stop = min(start + BLOCK, (piece + 1) * PIECE, N)
             out[start:stop] = 0.0
             for k in range(len(rows)):
-                _add(out[start:stop], theta[k], pool[rows[k], start:stop])
+                add(out[start:stop], theta[k], pool[rows[k], start:stop])
         piece = taken(counter)

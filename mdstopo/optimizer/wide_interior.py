@@ -14,7 +14,7 @@ are those of `kernels`; there a variable without bounds has both `AWAY`.
 import numpy as np
 
 from mdstopo.compiler.jit import member_kernel, vector_entry
-from mdstopo.optimizer.kernels import _add, _dot, _dot3, correct, direct, eliminate, move
+from mdstopo.optimizer.kernels import _dot3, add, correct, direct, dot, eliminate, move
 from mdstopo.optimizer.problem import Floats, Ints
 
 BLOCK = 1024
@@ -62,8 +62,8 @@ def _expand(
             g[i] = h[i] * (y[i] - c[i])
         for a in range(R):
             row = Q[a, start:stop]
-            values[a] += _dot(row, y)
-            _add(g, theta[a], row)
+            values[a] += dot(row, y)
+            add(g, theta[a], row)
         for i in range(stop - start):
             gap += ml[i] * bl[i] + mu[i] * bu[i]
             worst = max(worst, abs(g[i] - ml[i] + mu[i]))

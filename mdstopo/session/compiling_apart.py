@@ -115,6 +115,8 @@ def _compile_back(case: Case) -> None:
     """Compile the optimiser, and what looks back at steps."""
     meet(case, FEW)
     engine = evaluator_of(case, beside=False)
+    if getattr(problem_of(engine, even(case)), "competes", False):
+        meet(case, FEW, competes=True)
     engine.driver(next(iter(engine.scenes))).compile_responses()
 
 

@@ -31,8 +31,11 @@ def get_ready(
     Returns the stated first x (n,), the nearest one that keeps bounds and volume rows, and its motion in each load
     case. Raises CaseError where no design keeps the rows.
     """
+    competes = bool(getattr(problem, "competes", False))
     for size in [FEW, *(many for many in (MANY, WIDE) if len(problem.initial) >= many)]:
-        meet(case, size, size >= WIDE and bool(getattr(problem, "competes", False)))
+        meet(case, size, size >= WIDE and competes)
+    if competes:
+        meet(case, FEW, competes)
     stated, begin = first_design(case, problem, initial)
     before = motions(case, engine, case.space.expand(begin))
     if case.n_members <= _SMALL:

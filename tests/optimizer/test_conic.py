@@ -6,10 +6,12 @@ from hypothesis import assume, given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
 
+from mdstopo.optimizer import reduced
 from mdstopo.optimizer.conic import Lines, Norms, Program, solve
 from mdstopo.optimizer.curvature import Curvature, learnt
 from mdstopo.optimizer.problem import LinearRows
-from mdstopo.optimizer.reduced import Rows, reduced
+from mdstopo.optimizer.reduced import Curved, Rows
+from tests.space.in_python import in_python  # noqa: F401  # a fixture
 
 
 def no_lines(n):
@@ -117,24 +119,32 @@ def test_norms_are_solved_as_exactly_as_lines(seed):
     assert found.residual < 1e-11
 
 
-def test_multipliers_of_active_rows_are_no_quotients_of_rounding():
-    """Rows whose slack is all but nothing beside their multiplier meet the first two equations of the linear system."""
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("n", [20, 60])
+def test_multipliers_of_active_rows_are_no_quotients_of_rounding(n):
+    """Rows whose slack is all but nothing beside their multiplier meet the first two equations of the linear system,
+    whether rows (few variables) or variables (many) are eliminated."""
     rng = np.random.default_rng(1)
-    n, count = 20, 30
+    count = 30
     rows = Rows(rng.normal(size=(count, n)), np.arange(count) % 2, np.full(count, -1.0),
                 np.where(np.arange(count) < 8, 1e-14, 1e4))  # fmt: skip
     D, E, L, A = 10.0 ** rng.uniform(-8, 8, n), np.ones(1), np.zeros(1), np.ones((1, n))
-    flat = Curvature(np.zeros(n), np.zeros((n, 0)), np.zeros(0), np.eye(n))
-    system = reduced(flat, A, 2, count)
-    system.factor(D, rows, L, E)
+    factor = rng.normal(size=(2, n))
+    P = Curved(np.ones(n), factor, np.array([2.0, 0.5]), np.zeros((0, 0)))
+    system, solvable = reduced.factor.py_func(P, D, rows, A, L, E)
+    assert solvable
+    assert (len(system.inverse) > 0) == (n == 60)
     right = [rng.normal(size=size) for size in (n, 2, count, 1)]
-    dv, de, dy, da = system.solve(*right)
+    dv, de, dy, da = step = [np.empty_like(x) for x in right]
+    reduced.solve.py_func(system, rows, A, *right, *step)
     C = np.zeros((count, 2))
     C[np.arange(count), rows.level] = rows.C
     size = max(1.0, float(np.abs(dy).max()))
-    assert np.abs((1.0 + D) * dv + rows.G.T @ dy + A.T @ da - right[0]).max() < 1e-9 * size
+    curved = dv + factor.T @ (P.weight * (factor @ dv))
+    assert np.abs(curved + D * dv + rows.G.T @ dy + A.T @ da - right[0]).max() < 1e-9 * size
     assert np.abs(np.array([0.0, 1.0]) * de + C.T @ dy - right[1]).max() < 1e-12 * size
     assert np.abs(rows.G @ dv + C @ de - rows.S * dy - right[2]).max() < 1e-9 * size
+    assert np.abs(A @ dv - right[3]).max() < 1e-9 * size
 
 
 def test_no_solution_lies_outside_the_cones():
