@@ -12,6 +12,7 @@ needs, and an entry's machine code itself (`build`).
 import contextlib
 import ctypes
 import functools
+import gc
 import hashlib
 import inspect
 import os
@@ -29,12 +30,25 @@ from llvmlite import binding as llvm
 from llvmlite import ir as llvm_ir
 from llvmlite.ir.instructions import InsertValue
 from numba import types
-from numba.core import analysis, cgutils, cpu_options, ir, itanium_mangler, targetconfig
+from numba.core import (
+    analysis,
+    base,
+    cgutils,
+    cpu_options,
+    errors,
+    ir,
+    itanium_mangler,
+    lowering,
+    postproc,
+    targetconfig,
+    transforms,
+    typeinfer,
+)
 from numba.core.caching import FunctionCache, _Cache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.compiler_machinery import register_pass
+from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
 from numba.core.cpu import CPUContext
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.lowering import Lower as NumbaLower
@@ -59,6 +73,8 @@ from mdstopo.compiler.tried import UnexpectedError, has_own_passes
 
 #: whether our passes over a function fit this version
 _LEAN = has_own_passes()
+#: of what is not typed
+_ERRORS: Any = errors
 
 
 # The way from typed code to LLVM's
@@ -629,6 +645,8 @@ def _compiler(library: type[Optimised]) -> type[Compiler]:
             for manager in found:
                 manager.passes = [(_LEANER.get(each, each), told) for each, told in manager.passes]
                 manager.finalize()
+                if _LEAN:
+                    manager.__class__ = _Passes
             return found
 
     return Lean
@@ -960,7 +978,7 @@ def _remember_signatures() -> None:
     known: dict[Any, Any] = {}
 
     def get_call_type(self: Any, context: Any, asked: Any, named: Any) -> Any:
-        lasting = getattr(self.typing_key, "__module__", None) == "_operator"
+        lasting = _is_operator(self.typing_key)
         ours = context is _Dispatcher.targetdescr.typing_context
         if not (lasting and ours) or named or not all(isinstance(each, _LASTING) for each in asked):
             return ask(self, context, asked, named)
@@ -1021,12 +1039,156 @@ def _spare_variables() -> None:
     instruction._rec_list_vars = variables
 
 
+def _spare_lifetimes() -> None:
+    """After most passes over a function nobody asks which variables live where: it is found out when somebody does."""
+    processor: Any = postproc.PostProcessor
+    whole = processor.run
+
+    def run(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+        function = self.func_ir
+        if emit_dels or function.is_generator:
+            whole(self, emit_dels, extend_lifetimes)
+            return
+        function.blocks = transforms.canonicalize_cfg(function.blocks)
+        function.variable_lifetime = postproc.VariableLifetime(function.blocks)
+        function.generator_info = None
+
+    processor.run = run
+
+
+def _spare_classes() -> None:
+    """Classes of types are abstract ones, of which Python asks what else was registered for them: nothing is."""
+    kind: Any = type(types.Type)
+    kind.__instancecheck__ = type.__instancecheck__
+
+
+def _spare_contexts() -> None:
+    """What an error is told to have happened in is put together where there is an error."""
+    given: Any = _ERRORS.new_error_context
+
+    class Context:
+        """Numba's own, made when it is needed."""
+
+        __slots__ = ("_named", "_parts")
+
+        def __init__(self, *parts: Any, **named: Any) -> None:
+            self._parts, self._named = parts, named
+            place = named.get("loc")
+            if place is not None and not place.filename.startswith(_ERRORS._numba_path):
+                _ERRORS.loc_info.update(named)
+
+        def __enter__(self) -> None:
+            pass
+
+        def __exit__(self, kind: Any, error: Any, trace: Any) -> Any:
+            if kind is None:
+                return None
+            told = given(*self._parts, **self._named)
+            told.__enter__()
+            return told.__exit__(kind, error, trace)
+
+    modules: list[Any] = [errors, typeinfer, lowering]
+    for module in modules:
+        module.new_error_context = Context
+
+
+def _spare_places() -> None:
+    """Whether a function takes `loc` is seen in its code; what is made of others is asked as before."""
+    implementations: Any = base
+    ask = implementations._has_loc
+
+    def has(function: Any) -> bool:
+        code = getattr(function, "__code__", None)
+        if code is None or hasattr(function, "__wrapped__") or hasattr(function, "__signature__"):
+            return bool(ask(function))
+        return "loc" in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+
+    implementations._has_loc = has
+
+
+class _Settled:
+    """A call in rounds of `_spare_rounds`."""
+
+    __slots__ = ("call", "known", "names")
+
+    def __init__(self, call: Any) -> None:
+        self.call = call
+        self.known: list[Any] | None = None
+        given = [*call.args, *dict(call.kws).values()] + ([] if call.vararg is None else [call.vararg])
+        self.names = [call.target, *(each.name for each in given)]
+        if type(call) is typeinfer.CallConstraint:
+            self.names.append(call.func)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.call, name)
+
+    def __call__(self, infer: Any) -> None:
+        if infer.context is not _Dispatcher.targetdescr.typing_context:
+            self.call(infer)
+        elif self.known is None or self.known != self._types(infer):
+            self.known = None
+            self.call(infer)
+            found, now = self.call.signature, self._types(infer)
+            if found is not None and found.return_type.is_precise() and self._lasts(now):
+                self.known = now
+
+    def _types(self, infer: Any) -> list[Any]:
+        """Of what it returns, of what it is given, and where it has a name of what is called."""
+        return [infer.typevars[name].type for name in self.names]
+
+    def _lasts(self, now: list[Any]) -> bool:
+        """Whether the same is found for the same types, whenever it is looked for."""
+        if type(self.call) is typeinfer.CallConstraint:
+            return isinstance(now[-1], types.Dispatcher)
+        return all(isinstance(each, _LASTING) for each in now)
+
+
+def _spare_rounds() -> None:
+    """Types are inferred in rounds until nothing changes. A call of one of our kernels, or of an operator, is not
+    looked up once more where what it is given and what it is known to return are as they were after it was.
+
+    Functions of Numba's own are: which one is called where several fit is what was looked up last.
+    """
+    network: Any = typeinfer.ConstraintNetwork
+    called, operated = typeinfer.CallConstraint, typeinfer.IntrinsicCallConstraint
+
+    def append(self: Any, constraint: Any) -> None:
+        lasts = type(constraint) is called or (type(constraint) is operated and _is_operator(constraint.func))
+        self.constraints.append(_Settled(constraint) if lasts else constraint)
+
+    network.append = append
+
+
+def _is_operator(function: Any) -> bool:
+    return getattr(function, "__module__", None) == "_operator"
+
+
+class _Passes(PassManager):
+    """Passes over a function of ours: nobody listens to them or asks how long each took."""
+
+    def _runPass(self, index: int, each: Any, state: Any) -> None:
+        each.analysis = self._analysis
+        with global_compiler_lock, _ERRORS.new_error_context("Pass {name}", name=each.name()):
+            changed = [step(state) for step in (each.run_initialization, each.run_pass, each.run_finalizer)]
+        if not _pass_registry.get(each.__class__).mutates_CFG:
+            return
+        if any(changed):
+            postproc.PostProcessor(state.func_ir).run()
+        else:
+            state.func_ir.blocks = transforms.canonicalize_cfg(state.func_ir.blocks)
+
+
 _enter_target()
 _name_flags_in_order()
 if _LEAN:
     _remember_signatures()
     _spare_flags()
     _spare_variables()
+    _spare_lifetimes()
+    _spare_classes()
+    _spare_contexts()
+    _spare_places()
+    _spare_rounds()
     names: Any = itanium_mangler
     names._escape_string = functools.lru_cache(1 << 16)(names._escape_string)
 
@@ -1203,7 +1365,7 @@ def build(dispatcher: Any, letters: str) -> Code | None:
     Nothing where the code would need more of Numba's run time than is provided.
     """
     arguments = tuple(map(numba_type, letters.split()))
-    with _untold():
+    with _untold(), _unswept():
         return _built(dispatcher, arguments, letters)
 
 
@@ -1217,6 +1379,18 @@ def _untold() -> Iterator[None]:
         yield
     finally:
         told.extend(before)
+
+
+@contextlib.contextmanager
+def _unswept() -> Iterator[None]:
+    """Have Python not look for what could go: what the compiler makes lives on, and it takes a tenth of the time."""
+    looks = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if looks:
+            gc.enable()
 
 
 def _built(dispatcher: Any, arguments: tuple[Any, ...], letters: str) -> Code | None:

@@ -31,7 +31,12 @@ from mdstopo.integrators.rows import largest_difference, row_width
 from tests.compiled import compiled
 
 FLOOR = 1e-30
-with_vectors()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _vectors():
+    """Numba knows vectors: what these tests compile has them."""
+    with_vectors()
 
 
 @compiled

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 
@@ -35,11 +36,14 @@ def without_docstrings(source: str) -> ast.AST:
     return tree
 
 
-SOURCES = "\n".join(
-    text.replace("\n", " ")
-    for path in sorted((ROOT / "mdstopo").rglob("*.py"))
-    for text in texts(without_docstrings(path.read_text(encoding="utf-8")))
-)
+@cache
+def sources() -> str:
+    """The texts of all modules, one a line."""
+    return "\n".join(
+        text.replace("\n", " ")
+        for path in sorted((ROOT / "mdstopo").rglob("*.py"))
+        for text in texts(without_docstrings(path.read_text(encoding="utf-8")))
+    )
 
 
 def test_the_page_quotes_messages_and_each_once() -> None:
@@ -52,7 +56,7 @@ def test_a_quoted_message_is_one_of_the_program(message: str) -> None:
     parts = [part.strip(" ;:,()") for part in message.split("...")]
     assert sum(len(part) for part in parts) >= SHORTEST, "too short to be told from others"
     whole = ".*".join(re.escape(part) for part in parts)
-    if re.search(whole, SOURCES) is None:  # then it is put together from several texts
+    if re.search(whole, sources()) is None:  # then it is put together from several texts
         long = [part for part in parts if len(part) >= PART]
         assert long
-        assert [part for part in long if part not in SOURCES] == []
+        assert [part for part in long if part not in sources()] == []

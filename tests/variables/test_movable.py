@@ -212,10 +212,17 @@ constraints:
 """
 
 
-def test_a_run_moves_points_and_keeps_the_volume_of_lengths(tmp_path):
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """A run that moves points, and its file."""
+    place = tmp_path_factory.mktemp("beam") / "r.h5"
+    return run_session(read_case(BEAM), path=place), place
+
+
+def test_a_run_moves_points_and_keeps_the_volume_of_lengths(ran):
     case = read_case(BEAM)
     fixed = read_case(BEAM.replace("    movable: {within: {line: {from: [-1, -1], to: [-1, 1]}}}\n", ""))
-    free, bound = run_session(case), run_session(fixed)
+    (free, _), bound = ran, run_session(fixed)
     assert free.objectives["G"] < 0.98 * bound.objectives["G"]
     design = np.concatenate([free.alpha, *free.variables.values()])
     there = placed(case, design)
@@ -231,9 +238,8 @@ def test_a_run_that_is_resumed_ends_where_it_would_have(tmp_path):
     assert np.array_equal(whole_run.alpha, resumed.alpha)
 
 
-def test_a_finalized_design_has_its_points_where_they_came_to(tmp_path):
-    place = tmp_path / "r.h5"
-    outcome = run_session(read_case(BEAM), path=place)
+def test_a_finalized_design_has_its_points_where_they_came_to(ran, tmp_path):
+    outcome, place = ran
     case, design = opened(read_result(place), {})
     assert not case.movable
     assert len(design) == case.n_design
@@ -249,9 +255,8 @@ def test_a_finalized_design_has_its_points_where_they_came_to(tmp_path):
     assert done.difference < 1e-9
 
 
-def test_pictures_show_points_where_the_design_has_them(tmp_path):
-    place = tmp_path / "r.h5"
-    outcome = run_session(read_case(BEAM), path=place)
+def test_pictures_show_points_where_the_design_has_them(ran):
+    outcome, place = ran
     source = Source(place)
     assert source.case.points["wall"].world[:, 1] == pytest.approx(outcome.variables["wall.along"] - 1.0, abs=1e-12)
     for case in (source.stated, source.as_stated().case):

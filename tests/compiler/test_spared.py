@@ -1,0 +1,104 @@
+"""What Numba is spared while it compiles changes nothing: types, values and errors are those that it comes to alone."""
+
+import gc
+
+import numpy as np
+import pytest
+
+from mdstopo.compiler import tried
+from mdstopo.compiler.jit import entry, kernel
+
+pytestmark = pytest.mark.skipif(not tried.has_own_passes(), reason="Numba compiles with its own passes")
+
+
+@kernel
+def _sum(total, x):
+    return total + x
+
+
+@kernel
+def _larger(x, k):
+    return x * k if x > k else k
+
+
+@entry
+def widened(x, out):
+    """What a kernel is given becomes a float in the second round, when what it returned is known."""
+    total, most, other = 0, 0, 1
+    for k in range(x.shape[0]):
+        total = _sum(total, x[k])
+        most = _larger(most, k)
+        if k % 2 == 1:
+            other = other + total
+        other = other * 2
+    out[0], out[1], out[2] = total, most, other
+
+
+@entry
+def in_turns(n, out):
+    """Integers become floats through one another, over several rounds."""
+    a, b, c = 1, 2, 3
+    for _ in range(n):
+        a, b, c = _sum(b, 1), _sum(c, a), _sum(a, 0.25) / 2
+    out[0], out[1], out[2] = a, b, c
+
+
+@entry
+def mistaken(x):
+    return _sum(x, None)
+
+
+@pytest.mark.parametrize("program", [widened, in_turns], ids=["widened", "in_turns"])
+def test_types_that_change_between_rounds_give_what_python_gives(program, monkeypatch) -> None:
+    given = np.linspace(0.1, 2.3, 7) if program is widened else 9
+    found, expected = np.zeros(3), np.zeros(3)
+    program(given, found)
+    for each in (_sum, _larger):
+        monkeypatch.setitem(globals(), each.__name__, each.py_func)
+    program.py_func(given, expected)
+    assert found.tobytes() == expected.tobytes()
+
+
+def test_an_error_tells_the_calls_that_it_happened_in() -> None:
+    from numba.core.errors import TypingError
+
+    with pytest.raises(TypingError) as told:
+        mistaken(1.0)
+    words = str(told.value)
+    assert "unsupported operand" in words or "No implementation of function" in words
+    assert "During: typing of intrinsic-call at" in words
+    assert "During: resolving callee type: type(_Dispatcher(<function _sum" in words
+    assert words.count("During: Pass nopython_type_inference") == 2
+
+
+def test_cycles_are_looked_for_again_after_a_compilation() -> None:
+    from mdstopo.compiler.kernel import way
+
+    way()
+    compiles = tried.private()
+    assert compiles is not None
+    looked = []
+
+    def fails() -> None:
+        with compiles._unswept():
+            looked.append(gc.isenabled())
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fails()
+    assert looked == [False]
+    assert gc.isenabled()
+
+
+def test_no_type_of_numba_s_stands_for_others() -> None:
+    """Classes of types are asked without what Python registers for abstract ones."""
+    from numba import types
+
+    from mdstopo.compiler.kernel import way
+
+    way()
+    assert isinstance(types.int64, types.Integer)
+    assert not isinstance(types.int64, types.Float)
+    assert isinstance(types.Array(types.float64, 2, "C"), types.Buffer)
+    with pytest.raises(TypeError):
+        isinstance(types.int64, "types.Integer")
