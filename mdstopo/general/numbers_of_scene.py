@@ -24,7 +24,7 @@ from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.through import BESIDE_SCENE, CasesWith
 
 #: the arrays of a scene that may follow from names, besides places of members and numbers of laws
-BALANCE = ("mass", "v0", "force", "load_body", "load_follows", "load_arm", "load_force", "steady")
+BALANCE = ("mass", "v0", "force", "load_body", "load_follows", "load_arm", "load_force", "schur_constant")
 #: how far names are shifted, relative to their size, and how large they are at least, as a share of their range
 SHIFT, LEAST = 1e-4, 3e-3
 #: arrays that are seen from the principal axes of bodies. Those of an inertia that is scaled as a whole stay, but for
@@ -89,17 +89,17 @@ class NumbersOfScene:
             mass[own], v0[own] = dimension.masses(body), dimension.velocities(body, model.home[i])
         index = {name: i for i, name in enumerate([*(body.name for body in load_case.bodies), GROUND])}
         loads = dimension.loads(load_case, index, model.times, dimension.frames(load_case), True)
-        steady = model.steady
+        schur_constant = model.schur_constant
         if len(model.joint) and not np.array_equal(mass, model.mass):
             fixed = [dimension.joint_kernels(type(each)).steady for each in case.joints]
             layout = arrange(
                 case, model.joint, model.joint_par, fixed, model.free, mass, model.home, model.pair, bodies
             )
-            steady = layout.steady
+            schur_constant = layout.schur_constant
         return {
             "mass": mass, "v0": v0, "force": loads.force, "load_body": loads.load_body,
             "load_follows": loads.load_follows, "load_arm": loads.load_arm, "load_force": loads.load_force,
-            "steady": steady,
+            "schur_constant": schur_constant,
         }  # fmt: skip
 
 

@@ -126,8 +126,18 @@ def to_boundary(x: Floats, d: Floats) -> float:
 
 @member_kernel
 def aim(scaling: Scaling, target: float, ds: Floats, dy: Floats, corrected: bool, out: Floats) -> None:
-    """out (K, 3) = W (lam \\ (target e - lam o lam - (W^-1 ds) o (W dy))), o being the cone's product; the last term of
-    changes (K, 3) only where it is to be corrected for them."""
+    """What the products of cones are to change by: out = W (lam \\ (target e - lam o lam - (W^-1 ds) o (W dy))).
+
+    o is the cone's product, and lam \\ x solves lam o y = x.
+
+    In:
+      scaling: W and lam of K cones.
+      target: the complementarity to go to.
+      ds, dy (K, 3): changes of slacks and multipliers.
+      corrected: whether their product, the last term, is to be corrected for.
+    Out:
+      out (K, 3).
+    """
     left, right, total = np.empty(3), np.empty(3), np.empty(3)
     for k in range(len(out)):
         lam, w, eta = scaling.lam[k], scaling.w[k], scaling.eta[k]

@@ -135,7 +135,15 @@ def _gap(pair: Floats, cone: Floats) -> float:
 
 @member_kernel
 def _find_missing(p: Scaled, parts: Parts, pair: Floats, cone: Floats, free: Floats, missing: Missing) -> float:
-    """What is missing at a point, and the largest of it."""
+    """What is missing at a point, and the largest of it.
+
+    Constant:
+      p, parts: the problem, and where the parts of pairs begin.
+    In:
+      pair, cone, free: the point.
+    Out:
+      missing: the residuals.
+    """
     n, lines, norms, groups = len(p.at), len(missing.line), len(p.excess), len(missing.level)
     limits = parts.elastic - parts.limit
     v, lower, upper = pair[0, :n], pair[1, :n], pair[1, n : 2 * n]

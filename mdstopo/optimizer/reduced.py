@@ -81,7 +81,11 @@ def by_variables(variables: int, others: int) -> bool:
 
 @member_kernel
 def factor(P: Curved, D: Floats, rows: Rows, A: Floats, L: Floats, E: Floats) -> tuple[Factored, bool]:
-    """The system for D (N,), the rows, A (m, N), L (m,) and E (J,), and whether it can be solved."""
+    """The system, and whether it can be solved.
+
+    P, D (N,), A (m, N), L (m,), E (J,): what it is made of, with the letters of the module's equations.
+    rows: G, C and S of these.
+    """
     if len(P.matrix) or by_variables(len(D), len(P.weight) + len(rows.S)):
         found = _of_variables(P, D, rows, A, L, E)
     else:
@@ -155,7 +159,7 @@ def solve(
 @member_kernel
 def _of_variables(P: Curved, D: Floats, rows: Rows, A: Floats, L: Floats, E: Floats) -> Factored:
     """Rows eliminated but those that are all but active: a symmetric system of the variables, the levels, the linear
-    rows and the rows that are left. As for `factor`; not yet scaled, nor eliminated.
+    rows and the rows that are left. P, D, A, L, E, rows: as of `factor`. Not yet scaled, nor eliminated.
 
     The changes of the multipliers of eliminated rows are quotients by their S, which multiply the rounding of the
     solution: of rows that are all but active nothing would be left of them.
@@ -226,8 +230,8 @@ def _add_products(M: Floats, rows: Rows, gone: Ints, n: int) -> None:
 
 @member_kernel
 def _of_rows(P: Curved, D: Floats, rows: Rows, A: Floats, L: Floats, E: Floats) -> Factored:
-    """Variables eliminated: a symmetric system of the curvature's rank, the rows, the linear rows and the levels. As
-    for `factor`; not yet scaled, nor eliminated."""
+    """Variables eliminated: a symmetric system of the curvature's rank, the rows, the linear rows and the levels. P,
+    D, A, L, E, rows: as of `factor`. Not yet scaled, nor eliminated."""
     n, g, m, R, rank = len(D), len(E) + 1, len(L), len(rows.S), len(P.weight)
     count = rank + R + m
     size = count + g
