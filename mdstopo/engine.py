@@ -409,6 +409,13 @@ class Evaluator:
                 self._drivers[name] = self._made(name, method)
         return self._drivers[name]
 
+    def compile_responses(self) -> None:
+        """Have the machine code on the disk that looks back at steps, without any steps (`SceneDriver`).
+
+        `auto` is not asked whether these steps serve: it would simulate, which another process is compiling.
+        """
+        self._made(next(iter(self.scenes)), method_of(self._usual[0], self.case.solver)).compile_responses()
+
     def _made(self, name: str, method: Method) -> SceneDriver:
         """A driver of one load case by a method."""
         solver, looked = self.case.solver, tuple(self._by_load_case[name].values())

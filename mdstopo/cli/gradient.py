@@ -112,13 +112,15 @@ def command(
     with output_file(path, case, "gradient", overwrite=overwrite, notify=output.notice, command=line) as file:
         announce_compilation(output, case)
         from mdstopo.evaluators import evaluator_of
+        from mdstopo.session.compiling_apart import responses_apart
         from mdstopo.status import RunStatus
         from mdstopo.store.contents import design_part, sensitivity_part
 
-        engine = evaluator_of(case)
-        check_design(engine, alpha, alpha_path)
-        datasets: dict[str, Any] = design_part(case, engine.design(alpha))
-        results, failure = _all_methods(engine, alpha, methods, estimating)
+        with responses_apart(case):
+            engine = evaluator_of(case)
+            check_design(engine, alpha, alpha_path)
+            datasets: dict[str, Any] = design_part(case, engine.design(alpha))
+            results, failure = _all_methods(engine, alpha, methods, estimating)
         for method, result in results.items():
             datasets |= sensitivity_part(result["gradients"], method, result["by_variable"])
         if differencing and not failure:

@@ -3,6 +3,7 @@
 Why it is not this one, `starts.getting_ready` tells. Another process is this module run as a program: alone it compiles
 all that the case needs; with the word `back` what the optimiser needs and what looks back at steps that were made. For
 scenes with joints and other laws both run side by side, and what the one has compiled the other finds on the disk.
+Where nothing is optimised, one process beside this one has the word `responses`: `responses_apart`.
 """
 
 import contextlib
@@ -12,7 +13,7 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from mdstopo.case.model import Case
@@ -26,10 +27,10 @@ from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.starts.evaluator_interface import even, problem_of
 from mdstopo.starts.getting_ready import FEW, get_ready, meet
-from mdstopo.warm import compiling, tiny
+from mdstopo.warm import compilation_due, compiling, tiny
 
-#: the word that has a process compile what looks back
-BACK = "back"
+#: the words that have a process compile what looks back, with the optimiser and without it
+BACK, RESPONSES = "back", "responses"
 #: candidates that are priced to have the kernels compiled
 FEW_CANDIDATES = 1000
 
@@ -59,21 +60,48 @@ def _compile_in_children(message: bytes, each: list[list[str]]) -> None:
     children: list[subprocess.Popen[bytes]] = []
     try:
         for words in each:
-            child = subprocess.Popen(
-                command("mdstopo.session.compiling_apart", *words),
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-            )
-            children.append(child)
-            assert child.stdin is not None
-            child.stdin.write(message)
-            child.stdin.flush()
+            children.append(_begin(words))
+            _tell(children[-1], message)
         for child in children:
             child.wait()
     finally:
         for child in children:
             _end(child)
+
+
+@contextlib.contextmanager
+def responses_apart(case: Case) -> Iterator[None]:
+    """Meanwhile another process compiles what looks back at steps, where that is not there and as much as the steps.
+
+    It is for commands that evaluate: what they do meanwhile finds on the disk what the other process has compiled.
+    """
+    child = None
+    with contextlib.suppress(OSError):  # no process can be started, or it has ended
+        if beyond_springs(case) and compilation_due(case):
+            child = _begin([RESPONSES])
+            _tell(child, pickle.dumps(case))
+    try:
+        yield
+    finally:
+        if child is not None:
+            _end(child)
+
+
+def _begin(words: list[str]) -> subprocess.Popen[bytes]:
+    """A process that compiles, once it is told the case."""
+    return subprocess.Popen(
+        command("mdstopo.session.compiling_apart", *words),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def _tell(child: subprocess.Popen[bytes], message: bytes) -> None:
+    """Send a process the case."""
+    assert child.stdin is not None
+    child.stdin.write(message)
+    child.stdin.flush()
 
 
 def _end(child: subprocess.Popen[bytes]) -> None:
@@ -104,7 +132,9 @@ def _main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and ends this process with itself
     case: Case = pickle.load(sys.stdin.buffer)
     end_with_parent(sys.stdin.buffer)
-    if BACK in sys.argv[1:]:
+    if RESPONSES in sys.argv[1:]:
+        evaluator_of(case, beside=False).compile_responses()
+    elif BACK in sys.argv[1:]:
         _compile_back(case)
     else:
         _compile_all(case)
@@ -112,12 +142,12 @@ def _main() -> None:
 
 
 def _compile_back(case: Case) -> None:
-    """Compile the optimiser, and what looks back at steps."""
-    meet(case, FEW)
+    """Compile what looks back at steps, and the optimiser."""
     engine = evaluator_of(case, beside=False)
+    engine.compile_responses()
+    meet(case, FEW)
     if getattr(problem_of(engine, even(case)), "competes", False):
         meet(case, FEW, competes=True)
-    engine.driver(next(iter(engine.scenes))).compile_responses()
 
 
 def _compile_all(case: Case) -> None:
