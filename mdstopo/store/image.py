@@ -99,9 +99,9 @@ class _Writer:
         self._words = h5t.py_create(h5py.string_dtype(), logical=True)
         self._one = h5s.create(h5s.SCALAR)
         self._links = h5p.create(h5p.LINK_CREATE)
-        self._links.set_create_intermediate_group(True)
         self._links.set_char_encoding(h5t.CSET_UTF8)
-        self._plain = h5p.create(h5p.DATASET_CREATE)
+        self._plain = _without_times(h5p.DATASET_CREATE)
+        self._group = _without_times(h5p.GROUP_CREATE)
 
     def write(self, path: str, value: Value) -> None:
         """One dataset, the groups above it included."""
@@ -110,7 +110,7 @@ class _Writer:
         space = self._one if array.ndim == 0 else h5s.create_simple(array.shape)
         layout = self._plain
         if array.size and array.ndim:
-            layout = h5p.create(h5p.DATASET_CREATE)
+            layout = _without_times(h5p.DATASET_CREATE)
             layout.set_chunk(_chunks(array))
             layout.set_fletcher32()
         dataset = h5d.create(self._file, None, kind, space, layout)
@@ -119,16 +119,16 @@ class _Writer:
         self._enter(path, dataset)
 
     def _enter(self, path: str, made: Any) -> None:
+        above = path.rpartition("/")[0]
+        if above not in self._made:
+            self._enter(above, h5g.create(self._file, None, gcpl=self._group))
         h5o.link(made, self._file, path.encode(errors="surrogateescape"), self._links)
         self._made[path] = made
 
     def describe(self, path: str, attributes: Mapping[str, Attribute]) -> None:
         """Attributes of a dataset, or of a group, which is made where there is none."""
         if path not in self._made:
-            there = path.encode() in self._file
-            self._made[path] = h5o.open(self._file, path.encode()) if there else None
-            if not there:
-                self._enter(path, h5g.create(self._file, None))
+            self._enter(path, h5g.create(self._file, None, gcpl=self._group))
         for key, value in attributes.items():
             words = isinstance(value, str)
             data = np.array(_encoded(str(value)), dtype=h5py.string_dtype()) if words else np.array(value)
@@ -146,6 +146,13 @@ class _Writer:
                     h5ds.set_scale(self._made[scale], scale.split("/")[-1].encode())
                     scaled.add(scale)
                 h5ds.attach_scale(self._made[path], self._made[scale], axis)
+
+
+def _without_times(kind: Any) -> Any:
+    """Properties of objects that do not keep when they were made: the same content makes the same bytes."""
+    properties = h5p.create(kind)
+    properties.set_obj_track_times(False)
+    return properties
 
 
 def _chunks(array: NDArray[np.generic]) -> tuple[int, ...]:
