@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
-    from mdstopo.scene.through import Through
+    from mdstopo.scene.design_map import DesignMap
     from mdstopo.sensitivity.candidate_pass import CandidatePass
 
 #: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
@@ -78,9 +78,9 @@ class Evaluator:
         self._may_be_coarse = case.solver.step is not None and kind.finds_step
         self._compiles_beside = beside
         self._beside = Beside(kind.name, share) if beside and not self.beyond else None
-        self._through = _through(case)
+        self._design_map = _design_map_of(case)
         #: the case whose variables scenes know
-        own = case if self._through is None else self._through.case
+        own = case if self._design_map is None else self._design_map.case
         #: what the scenes' coordinates are measured from, and the case in these
         self._origin = origin_of(case)
         self._near = seen_from(own, self._origin)
@@ -167,9 +167,9 @@ class Evaluator:
             return self.otherwise(sensitivity="iterative").evaluate(alpha, gradient, method, rows)
         seen = self._seen  # first: a driver that is made may simulate a design of its own
         stated = self._design.take(alpha)
-        design, through = self.computed(stated), self._through
+        design, design_map = self.computed(stated), self._design_map
         edge = self._without_slope(stated, gradient)
-        nowhere = "" if through is None else through.trouble(False)
+        nowhere = "" if design_map is None else design_map.why_not(False)
         gradient = gradient and not edge
         exact = gradient and method == "adjoint"
         status, message, grazing = Status.OK, "", ""
@@ -197,8 +197,9 @@ class Evaluator:
                 break
             if result.grazing >= 0:
                 grazing = driver.member(result.grazing)
-            if through is not None:
-                gradients, across = (None if each is None else through.pull(each) for each in (gradients, across))
+            if design_map is not None:
+                pulled = (None if each is None else design_map.pull_back(each) for each in (gradients, across))
+                gradients, across = pulled
             for j, key in enumerate(keys):
                 looked[key] = _peaks(result, j, gradients, across, driver.shapes[j])
         if edge and status.ok:
@@ -316,7 +317,7 @@ class Evaluator:
         load_case = next(each.load_case for each in self.case.objectives if each.name == objective)
         place = list(self._by_load_case[load_case]).index(objective)
         status, t, lines = self.driver(load_case).histories(self.computed(design), place)
-        return status, t, lines if self._through is None else self._through.pull(lines)
+        return status, t, lines if self._design_map is None else self._design_map.pull_back(lines)
 
     def problem(self, scalarisation: "Scalarisation | None" = None) -> "Problem":
         """The case as the optimiser sees it; several objectives need a scalarisation."""
@@ -359,7 +360,7 @@ class Evaluator:
 
     def computed(self, design: FloatArray) -> FloatArray:
         """The design that scenes have in the place of one of the case (N + P,): what follows from defined names."""
-        return design if self._through is None else self._through.design(design)
+        return design if self._design_map is None else self._design_map.design(design)
 
     @cached_property
     def _seen(self) -> list[tuple[str, tuple[str, ...], SceneDriver]]:
@@ -371,7 +372,7 @@ class Evaluator:
         mu < 1, and what follows from defined names may have none."""
         if not gradient:
             return ""
-        if self._through is not None and (infinite := self._through.trouble(True)):
+        if self._design_map is not None and (infinite := self._design_map.why_not(True)):
             return infinite
         for name, power, part in self._rooted:
             if np.any(design[part] == 0.0):
@@ -497,14 +498,14 @@ class Evaluator:
         )
 
 
-def _through(case: Case) -> "Through | None":
+def _design_map_of(case: Case) -> "DesignMap | None":
     """How defined names that are design variables reach the scenes, where the case has such."""
     if case.follows is None:
         return None
-    from mdstopo.scene.through import Through, refuse_bounds
+    from mdstopo.scene.design_map import DesignMap, refuse_bounds
 
     refuse_bounds(case)
-    return Through(case)
+    return DesignMap(case)
 
 
 def _total(counts: list[list[int]]) -> list[int]:

@@ -238,6 +238,11 @@ class Case(Value):
         return DesignSpace(self.n_design, slots_of(counts, self.shared, self.mirrored), self.variables)
 
     @property
+    def defined_variables(self) -> tuple[Variable, ...]:
+        """The variables that are names in `define`."""
+        return tuple(each for each in self.variables if each.defined)
+
+    @property
     def start(self) -> FloatArray:
         """(N + P,) the initial design: alpha, then the values of variables."""
         values = [each.initials for each in self.variables]

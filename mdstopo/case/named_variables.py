@@ -84,7 +84,7 @@ def build_follows(
     owner = {each.defined: each for each in named}
     places = list(_expressions(written, (), ""))
     expressions = Expressions(tuple(owner), _given(written, owner), [each.text for each in places])
-    asked = _Asked(owner, top, groups, taken, reading)
+    classifier = _Classifier(owner, top, groups, taken, reading)
     numbers: list[Following] = []
     reaching: dict[str, list[Following]] = {word: [] for word in owner}
     good = True
@@ -92,7 +92,7 @@ def build_follows(
         words = expressions.depends(k)
         if not words:
             continue
-        number = asked.following(place, words[0], expressions.jumps(k))
+        number = classifier.following(place, words[0], expressions.jumps(k))
         if number is None:
             good = False
             continue
@@ -189,8 +189,8 @@ def _given(written: Node, variables: Collection[str]) -> dict[str, float | str]:
     return given
 
 
-class _Asked:
-    """What is asked of an expression that a variable reaches.
+class _Classifier:
+    """Tells what an expression that a variable reaches is in the case, or why nothing is differentiated by it.
 
     owner: the variables by their names. top, groups: the case as read, and its groups by name.
     taken: by group, place of the law and parameter, the variables that parameters have of their own.
@@ -206,7 +206,7 @@ class _Asked:
         reading: Reading,
     ) -> None:
         self._owner, self._top, self._groups, self._taken, self._reading = owner, top, groups, taken, reading
-        #: grids that have been asked about, and whether their points may follow
+        #: grids that have been looked up, and whether their points may follow
         self._grids: dict[str, bool] = {}
 
     def following(self, place: _Written, word: str, jump: str) -> Following | None:
@@ -303,7 +303,7 @@ def _corners(variables: Sequence[Variable]) -> Iterator[FloatArray]:
         for corner in itertools.product(*bounds):
             yield np.array(corner, dtype=np.float64)
         return
-    start = np.array([float(np.asarray(each.initial)) for each in variables])
+    start = np.concatenate([each.initials for each in variables])
     for i, pair in enumerate(bounds):
         for bound in pair:
             x = start.copy()

@@ -24,7 +24,7 @@ def with_names_fixed(case: Case, design: FloatArray) -> tuple[Case, FloatArray]:
     without them. What they cost is taken off the bounds of volume rows."""
     if case.follows is None:
         return case, design
-    named = [each for each in case.variables if each.defined]
+    named = case.defined_variables
     parts = case.space.parts
     own = np.array([parts[each.name].start for each in named])
     values = [min(max(float(design[i]), each.lower), each.upper) for i, each in zip(own, named, strict=True)]

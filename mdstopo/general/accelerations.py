@@ -107,6 +107,7 @@ def make_workspace(model):
     both = pair_freedoms(model)
     rows = most_rows(model)
     stages = max(STAGES) if coordinates(model) != freedoms(model) else 0
+    # where in it each piece ends
     turned = model.home.shape[0] * attitude(model)
     rel = turned + n_pair * pose_size(model)
     sums = rel + n_pair * sums_size(model)

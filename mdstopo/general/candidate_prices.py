@@ -1,7 +1,7 @@
 """The prices of members that are not built, by any laws, in a plane or in space: the derivative each would have.
 
-What the motion asks of members stands in states (`asked_states`). The members of a group lie between the points of two
-grids; here all of them are gone through, tile by tile, of which a few numbers are kept (as in
+What prices follow from is found first (`pricing_states`). The members of a group lie between the points of two grids;
+here all of them are gone through, tile by tile, of which a few numbers are kept (as in
 `sensitivity.candidate_prices`), or single ones.
 
 No step ends at a switch of a member of alpha = 0. So one whose law switches is followed through the steps by its

@@ -254,11 +254,11 @@ class GeneralDriver:
             status = Status.ROTATION_JUMP
         elif code == OK:
             if gradient and self._plain_peaks and across is None:
-                differentiated = self._look_with_gradients(count, window)
+                differentiated = self._find_peaks_with_gradients(count, window)
             else:
                 differentiated = False
                 for j, name in enumerate(self.scene.reductions):
-                    self._look(j, name, count, gradient, window)
+                    self._reduce_response(j, name, count, gradient, window)
             if gradient and not differentiated:
                 self._row_gradients(count, across)
             status, message = self._without_value(gradient)
@@ -330,7 +330,7 @@ class GeneralDriver:
                     return int(member)
         return -1
 
-    def _look(self, j: int, reduction: str, count: int, gradient: bool, window: float) -> None:
+    def _reduce_response(self, j: int, reduction: str, count: int, gradient: bool, window: float) -> None:
         """Rows of response j, reduced over time; of an integral the gradient, too."""
         rows = self.rows[j]
         if reduction in INTEGRALS:
@@ -374,7 +374,7 @@ class GeneralDriver:
         plain = not compete(model.response[0, 0], reduction) and switches_of(model, 0) == 0
         return reduction in PEAKS and plain and self.rows.shape[1] * len(self.padded) <= BLOCK
 
-    def _look_with_gradients(self, count: int, window: float) -> bool:
+    def _find_peaks_with_gradients(self, count: int, window: float) -> bool:
         """Rows of the only response, with their gradients; False where these are still to be found."""
         (reduction,) = self.scene.reductions
         found, differentiated = self.ready("peaks_vjp", self.entry.peaks_vjp, *self._plain_arguments(count, window))

@@ -13,15 +13,15 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.following import expressions_of
-from mdstopo.case.model import GROUND, Case, LoadCase, Variable
+from mdstopo.case.model import GROUND, Case, LoadCase
 from mdstopo.general.dimension import dimension_of
 from mdstopo.general.kinks import landed
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import VARIED_COLUMNS, GeneralModel, pack_general
 from mdstopo.general.moved_ends import WIDTH
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
+from mdstopo.scene.design_map import BESIDE_SCENE, CasesWith
 from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.through import BESIDE_SCENE, CasesWith
 
 #: the arrays of a scene that may follow from names, besides places of members and numbers of laws
 BALANCE = ("mass", "v0", "force", "load_body", "load_follows", "load_arm", "load_force", "schur_constant")
@@ -45,7 +45,7 @@ class NumbersOfScene:
         self._there = CasesWith(case, self._numbers, BESIDE_SCENE)
         #: how many names there are
         self.count = len(case.follows.names)
-        self._least = [LEAST * (each.upper - each.lower) for each in names_of(case)]
+        self._least = [LEAST * (each.upper - each.lower) for each in case.defined_variables]
         self._twins: list[tuple[GeneralModel, GeneralModel]] = []
         self._apart = np.zeros(0)
 
@@ -103,11 +103,6 @@ class NumbersOfScene:
         }  # fmt: skip
 
 
-def names_of(case: Case) -> list[Variable]:
-    """The variables of a case of scenes that are names."""
-    return [each for each in case.variables if each.defined]
-
-
 def refuse_other_places(case: Case, compiled: Callable[[Case, LoadCase], GeneralModel]) -> None:
     """Refuse names from which more of a scene follows than what it is differentiated by (CaseError).
 
@@ -116,9 +111,9 @@ def refuse_other_places(case: Case, compiled: Callable[[Case, LoadCase], General
     follows = case.follows
     assert follows is not None
     expressions = expressions_of(follows, follows.numbers)
-    start = np.array([float(np.asarray(each.initial)) for each in names_of(case)])
+    start = np.concatenate([each.initials for each in case.defined_variables])
     values = expressions.values(start)
-    asked = [name for name in GeneralModel._fields if name not in BALANCE]
+    unchanged = [name for name in GeneralModel._fields if name not in BALANCE]
     for key in ("settle", "assemble"):
         if getattr(case.solver, key):
             _refuse(case, expressions.depends(0)[0], f"{follows.numbers[0].key}, which does not go with solver.{key}")
@@ -134,7 +129,7 @@ def refuse_other_places(case: Case, compiled: Callable[[Case, LoadCase], General
         turned = TURNED if all(".inertia" in follows.numbers[k].key for k in which.tolist()) else ()
         for load_case in there.load_cases:
             one, other = before[load_case.name], compiled(there, load_case)
-            if any(_differ(getattr(one, name), getattr(other, name), name in turned) for name in asked):
+            if any(_differ(getattr(one, name), getattr(other, name), name in turned) for name in unchanged):
                 return True
         return False
 

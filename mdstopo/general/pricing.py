@@ -1,4 +1,4 @@
-"""From Python to the compiled entries that price candidates of any laws (`asked_states`, `candidate_prices`)."""
+"""From Python to the compiled entries that price candidates of any laws (`pricing_states`, `candidate_prices`)."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -9,12 +9,12 @@ from mdstopo.case.laws import Law
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.compiler.threads import allowed
 from mdstopo.general import candidate_prices as kernels
-from mdstopo.general.asked_states import OF_A_ROW, ask_members, keep_states
 from mdstopo.general.candidate_prices import FIELDS, NODE, NODES, PLACES
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.dimension import dimension_of, in_frame
 from mdstopo.general.extremes import COLUMNS, FRACTION, RATE, STEP
 from mdstopo.general.model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
+from mdstopo.general.pricing_states import OF_A_ROW, keep_states, states_of_sum
 from mdstopo.general.row_gradients import sign_of, wanted_rows
 from mdstopo.general.step_history import FIRST
 from mdstopo.general.variables import as_computed
@@ -39,7 +39,7 @@ class ScenePricingStates(NamedTuple):
     """The states of one load case from which prices follow, of a weighted sum of rows.
 
     case, scene: as compiled. model: of the run, whose segments may be more than the scene's. pairs: the number of each
-    pair among those that are kept. steps: where the law of a group switches. The others as of `ask_members`.
+    pair among those that are kept. steps: where the law of a group switches. The others as of `states_of_sum`.
     """
 
     case: Case
@@ -67,7 +67,7 @@ class PricingStates(NamedTuple):
 
 
 class _Rows(NamedTuple):
-    """Rows and integrals with their weights, as `ask_members` takes them."""
+    """Rows and integrals with their weights, as `states_of_sum` takes them."""
 
     which: IndexArray
     rows: FloatArray
@@ -93,7 +93,7 @@ def pricing_states_of(driver: "GeneralDriver", factor: FloatArray) -> PricingSta
         driver.room, driver.room_ints, driver.member_state, scratch, pose, change, pose_a, energy, when, segment,
         driver.work,
     )  # fmt: skip
-    ask_members(*arguments)
+    states_of_sum(*arguments)
     numbers = {pair: number for number, pair in enumerate(pairs)}
     own = ScenePricingStates(
         driver.case, driver.scene, model, numbers, pose, change, pose_a, energy, when, segment, None

@@ -45,8 +45,11 @@ class Units(NamedTuple):
 
 
 @kernel
-def make_units(model, columns):
-    """Arrays for unit cotangents; columns: M_padded + P."""
+def make_units(model, rows, columns):
+    """Arrays for the unit cotangents of so many rows: empty ones where the rows are not more than these.
+
+    columns: M_padded + P.
+    """
     n = model.mass.shape[0]
     place = np.empty(n, np.int64)
     free = 0
@@ -54,7 +57,7 @@ def make_units(model, columns):
         if model.free[d] != 0:
             place[free] = d
             free += 1
-    many = 2 * free
+    many = 2 * free if rows > 2 * free else 0
     return Units(
         place[:free], np.empty((many, n)), np.empty((many, n)), np.zeros((many, 2, n)),
         np.empty((many, count_sets(model))), np.empty((many, 17, n)), np.empty((many, columns)), np.ones(many),
@@ -240,7 +243,7 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
                 bar_set[own], z[own], y, workspace, out[own], work,
             )  # fmt: skip
         begins[m] = w
-    units = make_units(model, out.shape[1])
+    units = make_units(model, total, out.shape[1])
     w = begins[0] if total > 0 else -1
     active = 0
     while w >= 0:

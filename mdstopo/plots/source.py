@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
-from mdstopo.scene.through import as_designed
+from mdstopo.scene.design_map import as_designed
 from mdstopo.store.result_reader import ResultView, read_result
 from mdstopo.store.store_errors import DamagedError, StoreError
 from mdstopo.store.stored_case import case_of

@@ -17,7 +17,7 @@ from mdstopo.case.model import Case, MemberGroup, ResponseRow, VolumeRow
 from mdstopo.case.movable import points_at, turned_out
 from mdstopo.case.start_geometry import frames_of
 from mdstopo.scene.bodies import distances
-from mdstopo.scene.through import Through
+from mdstopo.scene.design_map import DesignMap
 
 
 def moves(case: Case, group: MemberGroup) -> bool:
@@ -52,13 +52,13 @@ class VolumeThrough:
 
     def __init__(self, case: Case, row: VolumeRow) -> None:
         self._prices = row.prices if len(row.prices) else np.zeros(case.space.length - case.n_design)
-        self._through = Through(case)
-        self._of_points = MovingVolume(self._through.case, replace(row, prices=np.zeros(0)))
+        self._design_map = DesignMap(case)
+        self._of_points = MovingVolume(self._design_map.case, replace(row, prices=np.zeros(0)))
 
     def at(self, design: FloatArray) -> tuple[float, FloatArray]:
         """The sum at a design (N + P,), and its derivative (N + P,)."""
-        total, slope = self._of_points.at(self._through.design(design))
-        pulled = self._through.pull(slope)
+        total, slope = self._of_points.at(self._design_map.design(design))
+        pulled = self._design_map.pull_back(slope)
         n = len(design) - len(self._prices)
         pulled[n:] += self._prices
         return total + float(self._prices @ design[n:]), pulled

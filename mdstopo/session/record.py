@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.optimizer.start_families import best_run
 from mdstopo.optimizer.state import State
-from mdstopo.scene.through import as_designed
+from mdstopo.scene.design_map import as_designed
 from mdstopo.session.start_in_stages import ROUND, STAGE, first_row, furthest, is_done
 from mdstopo.starts.constraint_columns import constraint_values
 from mdstopo.store.contents import Datasets, design_part, ends_part

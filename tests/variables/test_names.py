@@ -17,7 +17,7 @@ from mdstopo.finalize.finalize_design import finalize, opened, ready
 from mdstopo.robust.ensemble import Ensemble
 from mdstopo.robust.points import case_at
 from mdstopo.robust.sample import design_sample
-from mdstopo.scene.through import as_designed
+from mdstopo.scene.design_map import as_designed
 from mdstopo.session.run_session import run_session
 from mdstopo.store.result_reader import read_result
 from tests.variables.support import OBJECTIVES, differences, whole, whole_and_resumed, widths

@@ -1,4 +1,4 @@
-"""Defined names that are design variables, put through to the numbers that scenes know.
+"""From designs with defined names to designs of the numbers that scenes know, and back for derivatives.
 
 Scenes vary parameters of laws and coordinates of points, each by itself, and numbers that masses, loads and velocities
 at the start follow from. A case whose variables are defined names is computed as one in which what follows from them
@@ -36,7 +36,7 @@ SHIFT = 1e-2
 SIXTH = ((1.0, 0.75), (2.0, -0.15), (3.0, 1.0 / 60.0))
 
 
-class Through:
+class DesignMap:
     """Between designs of a case (N + P,) and of the one that scenes are made of (N + P',).
 
     case: the latter. Its variables are those of the former that are no names, then numbers of laws and coordinates of
@@ -84,7 +84,7 @@ class Through:
         none: IndexArray = np.zeros(0, dtype=np.intp)
         self._kept = np.concatenate([np.arange(n), *(_places(parts[each.name]) for each in own)])
         self._at = np.concatenate([np.arange(n), *(_places(inner[each.name]) for each in own)])
-        named = [each for each in self._stated.variables if each.defined]
+        named = self._stated.defined_variables
         self._names = np.array([parts[each.name].start for each in named], dtype=np.intp)
         self._at_laws = np.array([inner[each.key].start for each in self._laws], dtype=np.intp)
         self._at_points = np.concatenate([none, *(_places(inner[each.name]) for each in self._points.variables)])
@@ -94,7 +94,7 @@ class Through:
         self._values = np.zeros(len(self._laws))
 
     def design(self, stated: FloatArray) -> FloatArray:
-        """The design (N + P',) of a stated one (N + P,), from which on `pull` is at that one."""
+        """The design (N + P',) of a stated one (N + P,), from which on `pull_back` is at that one."""
         self._x = stated[self._names]
         self._values = self._of_laws.values(self._x)
         design = np.empty(self.case.space.length)
@@ -104,7 +104,7 @@ class Through:
         design[self._at_scene] = stated[self._kept_scene]
         return design
 
-    def pull(self, rows: FloatArray) -> FloatArray:
+    def pull_back(self, rows: FloatArray) -> FloatArray:
         """(..., N + P): derivatives by the stated design of what has the derivatives rows (..., N + P')."""
         out = np.zeros((*rows.shape[:-1], self._stated.space.length))
         out[..., self._kept] = rows[..., self._at]
@@ -114,8 +114,8 @@ class Through:
             out[..., self._names] += rows[..., self._at_points] @ self._points.slopes(self._x)
         return out
 
-    def trouble(self, gradient: bool) -> str:
-        """Why nothing can be computed at the design that was put through last, or no derivative; or nothing."""
+    def why_not(self, gradient: bool) -> str:
+        """Why nothing can be computed at the design that was mapped last, or no derivative; or nothing."""
         finite = np.isfinite(self._of_laws.slopes(self._x)).all(axis=1) if gradient else np.isfinite(self._values)
         if finite.all():
             return ""
@@ -136,7 +136,7 @@ class _Points:
         self._expressions = expressions_of(stated.follows, self._numbers)
         self._grids = tuple(dict.fromkeys(each.grid for each in self._numbers))
         self._there = CasesWith(stated, self._numbers, _BESIDE_POINTS) if self._grids else None
-        named = [each for each in stated.variables if each.defined]
+        named = stated.defined_variables
         self._least = np.array([SHIFT * (each.upper - each.lower) for each in named])
         #: the names that places of points depend on
         self._moving = [v for v, each in enumerate(named) if each.moved]
@@ -203,9 +203,9 @@ def refuse_bounds(case: Case) -> None:
         return
     expressions = expressions_of(case.follows, numbers)
     there = CasesWith(case, numbers, _BESIDE_POINTS)
-    named = [each for each in case.variables if each.defined]
+    named = case.defined_variables
     bounds = np.array([[each.lower, each.upper] for each in named]).T
-    start = np.array([float(np.asarray(each.initial)) for each in named])
+    start = np.concatenate([each.initials for each in named])
     corners = [(named[0], row) for row in bounds]
     for v, each in enumerate(named):
         corners += [(each, np.where(np.arange(len(named)) == v, row, start)) for row in bounds]
@@ -231,8 +231,8 @@ def as_designed(case: Case, design: FloatArray) -> Case:
     """The case with points where a design (N + P,) has them, its variables beginning there (`movable.placed`)."""
     if case.follows is None:
         return placed(case, design)
-    through = Through(case)
-    there = placed(through.case, through.design(design))
+    design_map = DesignMap(case)
+    there = placed(design_map.case, design_map.design(design))
     values = case.space.named(design)
     begun = [
         replace(each, initial=values[each.name] if each.points else float(values[each.name][0]))

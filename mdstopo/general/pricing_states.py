@@ -1,4 +1,4 @@
-"""What a weighted sum of rows and integrals asks of members: states of the motion, with virtual changes of poses there.
+"""The states from which prices of members follow, of a weighted sum of rows and integrals.
 
 A member adds to the derivative a sum over states that knows of the motion only the relative pose of its two bodies with
 its rates, the virtual change of that pose, and the weight of the stored energy. These are few numbers: here they are
@@ -16,7 +16,7 @@ from mdstopo.general.extremes import FRACTION, STEP, WHO
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import count_sets
 from mdstopo.general.responses import design_slopes, energy_weight
-from mdstopo.general.row_sweep import step_of_rows
+from mdstopo.general.row_sweep import add_share, step_of_rows
 from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     freedoms,
@@ -32,7 +32,7 @@ OF_A_ROW = 1 + MOST_STAGES
 
 
 @entry
-def ask_members(
+def states_of_sum(
     tag,
     ints,
     floats,
@@ -57,7 +57,7 @@ def ask_members(
     segment,
     work,
 ):
-    """Write down what a weighted sum of R rows and K integrals asks of members between some pairs of bodies.
+    """The pricing states of a weighted sum of R rows and K integrals, for members between some pairs of bodies.
 
     Constant:
       tag: the method of integration (`method_interface`).
@@ -89,12 +89,12 @@ def ask_members(
         for o in range(history.index[w, FIRST], history.index[w + 1, FIRST]):
             _keep_stage(model, history, o, history.index[w, SEGMENT], pairs, states, o)
     if rows.shape[0] > 0:
-        _ask_rows(
+        _states_of_rows(
             tag, model, tables, member_state, history, count, which, rows, factor, workspace, pairs, states, change,
             energy, padded, work,
         )  # fmt: skip
     for k in range(integrals.shape[0]):
-        _ask_integral(
+        _states_of_integral(
             tag, model, tables, member_state, history, count, integrals[k, 0], integrals[k, 1] != 0, share[k],
             workspace, pairs, change, energy, padded[0], work,
         )  # fmt: skip
@@ -124,7 +124,7 @@ def _keep_stage(model, history, o, segment, pairs, states, at):
     model: the compiled scene.
     history: the history of steps (`StepHistory`).
     pairs (G,): the pairs.
-    states: poses, second derivatives, times and segments, as of `ask_members`.
+    states: poses, second derivatives, times and segments, as of `states_of_sum`.
     """
     _keep(
         model, history.stage_q[o], history.stage_v[o], history.stage_a[o], history.when[o], segment, pairs, states, at
@@ -139,7 +139,7 @@ def _keep(model, q, v, a, t, segment, pairs, states, at):
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     t, segment: time (s), and the segment of it.
     pairs (G,): the pairs.
-    states: poses, second derivatives, times and segments, as of `ask_members`.
+    states: poses, second derivatives, times and segments, as of `states_of_sum`.
     at: the number of the state.
     """
     pose, pose_a, when, segments = states
@@ -171,12 +171,12 @@ def _add_change(model, q, v, z, factor, pairs, out):
 
 
 @kernel
-def _ask_rows(
+def _states_of_rows(
     tag, model, tables, member_state, history, count, which, rows, factor, workspace, pairs, states, change, energy,
     padded, work,
 ):  # fmt: skip
-    """What rows ask, as `ask_members` has it: the sum of their cotangents, each with its weight from where the row
-    begins, goes back through the steps.
+    """The pricing states of rows: the sum of their cotangents goes back through the steps, each joining with its weight
+    where its row begins.
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
@@ -238,11 +238,11 @@ def _ask_rows(
     every = slice(total, total + 1)
     while w >= 0:
         while joined < total and begins[joined] >= w:
-            _add_row(factor[joined], lam_q[joined], lam_q[total])
-            _add_row(factor[joined], lam_v[joined], lam_v[total])
+            add_share(factor[joined], lam_q[joined], lam_q[total])
+            add_share(factor[joined], lam_v[joined], lam_v[total])
             for carried in range(2):
-                _add_row(factor[joined], lam_x[joined, carried], lam_x[total, carried])
-            _add_row(factor[joined], bar_set[joined], bar_set[total])
+                add_share(factor[joined], lam_x[joined, carried], lam_x[total, carried])
+            add_share(factor[joined], bar_set[joined], bar_set[total])
             joined += 1
         before = step_of_rows(
             tag, model, tables, member_state, history, count, w, fraction[every], lam_q[every], lam_v[every],
@@ -250,13 +250,6 @@ def _ask_rows(
         )  # fmt: skip
         _add_changes(model, history, w, z[0], 1.0, pairs, change[history.index[w, FIRST] :])
         w = before
-
-
-@part
-def _add_row(factor, x, out):
-    """out += factor x."""
-    for i in range(out.shape[0]):
-        out[i] += factor * x[i]
 
 
 @kernel
@@ -290,7 +283,7 @@ def _keep_row(
       member_state (3, columns): state of the members.
       history: the history of steps (`StepHistory`); a partial step is kept behind it.
     Out:
-      states: poses, second derivatives, times and segments, as of `ask_members`.
+      states: poses, second derivatives, times and segments, as of `states_of_sum`.
       change (G, D): added to.
       workspace: workspace of a balance (`accelerations.Workspace`).
       work (WORK,): counts of work, added to.
@@ -313,11 +306,11 @@ def _keep_row(
 
 
 @kernel
-def _ask_integral(
+def _states_of_integral(
     tag, model, tables, member_state, history, count, j, square, factor, workspace, pairs, change, energy, scratch,
     work,
 ):  # fmt: skip
-    """What an integral asks, as `ask_members` has it.
+    """The pricing states of an integral, as `states_of_sum` has them.
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
