@@ -40,7 +40,7 @@ SECTIONS = {
     "forward_space": "forward runs of two bodies in space beside other programs",
     "seat": "the seated occupant of the restraint case, with contacts and slack, beside JAX",
     "million": "a million members beside JAX",
-    "parts": "what parts of our own save: single precision, sines and powers, counting (compiles for minutes)",
+    "parts": "what parts of our own save: powers, counting (compiles for minutes)",
     "golden": "what differs to the bit from values, gradients and iterates kept before (--check FILE, --write FILE)",
     "damage": "500 kills and 1,000 damages of result files, caches and locks: nothing is lost, nothing hangs",
     "hunt": "random scenes against a second model, differences, invariances and the error estimates (--minutes)",

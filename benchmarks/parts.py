@@ -22,21 +22,6 @@ ROUNDS, SECONDS = 31, 0.15
 BAR = 1.05
 
 
-def _changed(module: str, name: str, value: float) -> None:
-    """Give a number of a module another value, before kernels are compiled with it."""
-    found = importlib.import_module(module)
-    getattr(found, name)  # AttributeError, not a measurement of nothing, where it has another name
-    setattr(found, name, value)
-
-
-def _without_single_precision() -> None:
-    _changed("mdstopo.integrators.gauss", "SINGLE_TOLERANCE", float("inf"))
-
-
-def _with_libm_sines() -> None:
-    _changed("mdstopo.mechanics.angles", "FAR", -1.0)
-
-
 def _with_libm_powers() -> None:
     def one_by_one(t, exponent, out, room):  # type: ignore[no-untyped-def]
         for i in range(len(t)):
@@ -55,11 +40,8 @@ def _with_numba_counting() -> None:
 
 #: by part: the case, its integrator, what is timed, and how the part is left out
 PARTS: dict[str, tuple[str, str, str, Callable[[], None]]] = {
-    "single precision in the first pass": ("fig6", "gauss", "evaluate", _without_single_precision),
-    "single precision in the first pass, more members": ("fig7-g1", "gauss", "evaluate", _without_single_precision),
-    "own sine and cosine": ("fig6", "gauss", "evaluate", _with_libm_sines),
-    "own sine and cosine, every stage": ("fig6", "runge_kutta", "evaluate", _with_libm_sines),
-    "own powers": ("fig6", "gauss", "optimize", _with_libm_powers),
+    "own powers": ("fig7-g1", "gauss", "optimize", _with_libm_powers),
+    "own powers, where few are needed": ("fig6", "gauss", "optimize", _with_libm_powers),
     "own counting of what arrays hold": ("fig6", "runge_kutta", "evaluate", _with_numba_counting),
 }
 

@@ -5,12 +5,8 @@ vectors and floats, `inverse_root`, `total` and their like. The arrays' length m
 padding of blocks of members is.
 
 The processor decides what becomes of it: eight lanes, and an instruction that begins 1/sqrt, where there is AVX-512;
-four elsewhere, with a square root and a division. Arrays in single precision give vectors in single precision, of twice
-as many lanes: `lanes_of` and `zero_of` are what `lanes` and `zero` are for the numbers of an array. Run as Python
-(`py_func`), these functions work on NumPy arrays.
+four elsewhere, with a square root and a division. Run as Python (`py_func`), these functions work on NumPy arrays.
 """
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +14,6 @@ from numpy.typing import NDArray
 from mdstopo.compiler.kernel import when_compiling
 
 Floats = NDArray[np.float64]
-AnyFloats = NDArray[np.floating[Any]]
 
 #: lanes of the widest vectors, and of the others
 WIDE, NARROW = 8, 4
@@ -34,23 +29,13 @@ def zero() -> Floats:
     return np.zeros(lanes())
 
 
-def lanes_of(array: AnyFloats) -> int:
-    """How many numbers a vector of the array's kind has."""
-    return lanes() * 8 // array.itemsize
-
-
-def zero_of(array: AnyFloats) -> AnyFloats:
-    """A vector of zeros of the array's kind."""
-    return np.zeros(lanes_of(array), array.dtype)
-
-
 def load(array: Floats, i: int) -> Floats:
     """The numbers of a contiguous array from i on; fast where the address is a multiple of 64."""
-    return array[i : i + lanes_of(array)].copy()
+    return array[i : i + lanes()].copy()
 
 
 def store(array: Floats, i: int, vector: Floats) -> None:
-    """Write a vector into a contiguous array from i on; into one in single precision, its numbers are shortened."""
+    """Write a vector into a contiguous array from i on."""
     array[i : i + len(vector)] = vector
 
 
@@ -93,7 +78,7 @@ def unmarked(vector: Floats, bits: int) -> Floats:
     return np.where((bits >> np.arange(len(vector))) & 1, 0.0, vector)
 
 
-def fetch(array: AnyFloats, i: int) -> None:
+def fetch(array: Floats, i: int) -> None:
     """Have what lies at array[i] brought near, because it will be asked for; i may be behind the end."""
 
 

@@ -30,18 +30,17 @@ _FUSED = ("contract", "nsz")
 
 
 class VectorType(types.Type):
-    """So many numbers of a kind: `number` as Numba knows them, `code` the vector as LLVM does."""
+    """So many numbers in double precision: `code` is the vector as LLVM knows it."""
 
-    def __init__(self, number: Any, scalar: Any, count: int) -> None:
-        super().__init__(name=f"vector{count}x{number}")
-        self.number = number
+    def __init__(self, count: int) -> None:
+        super().__init__(name=f"vector{count}x{types.float64}")
         self.count = count
-        self.code = ir.VectorType(scalar, count)
+        self.code = ir.VectorType(ir.DoubleType(), count)
 
 
-VECTOR = VectorType(types.float64, ir.DoubleType(), _LANES)
-ROUGH = VectorType(types.float32, ir.FloatType(), 2 * _LANES)
-_KINDS = {kind.number: kind for kind in (VECTOR, ROUGH)}
+VECTOR = VectorType(_LANES)
+#: how far apart addresses of numbers are
+_BYTES = 8
 
 
 @register_model(VectorType)
@@ -82,7 +81,7 @@ def _implement(function: Callable[..., Any], given: tuple[type, ...], result: Re
 def _fits(asked: Any, given: type) -> bool:
     if given is types.Array:
         return bool(
-            isinstance(asked, types.Array) and asked.ndim == 1 and asked.layout == "C" and asked.dtype in _KINDS
+            isinstance(asked, types.Array) and asked.ndim == 1 and asked.layout == "C" and asked.dtype == types.float64
         )
     return isinstance(asked, given)
 
@@ -100,36 +99,29 @@ def _declared(build: Any, form: Any, name: str) -> Any:
     return ir.Function(build.module, form, name) if found is None else found
 
 
-def _of(array: Any, *_: Any) -> Any:
-    """The vectors of an array."""
-    return _KINDS[array.dtype]
+def _vector(*_: Any) -> Any:
+    """What vectors give, and vectors with numbers."""
+    return VECTOR
 
 
-def _common(*asked: Any) -> Any:
-    """What vectors of one kind and numbers give."""
-    kinds = {each for each in asked if isinstance(each, VectorType)}
-    return kinds.pop() if len(kinds) == 1 else None
+def _constant(value: float) -> Any:
+    return ir.Constant(VECTOR.code, [value] * _LANES)
 
 
-def _constant(kind: VectorType, value: float) -> Any:
-    return ir.Constant(kind.code, [value] * kind.count)
-
-
-def _same(build: Any, kind: VectorType, number: Any) -> Any:
+def _same(build: Any, number: Any) -> Any:
     """A vector of one number."""
-    if number.type != kind.code.element:
-        number = (build.fptrunc if kind is ROUGH else build.fpext)(number, kind.code.element)
-    places = ir.VectorType(ir.IntType(32), kind.count)
-    nothing = ir.Constant(kind.code, ir.Undefined)
+    if number.type != VECTOR.code.element:
+        number = build.fpext(number, VECTOR.code.element)
+    places = ir.VectorType(ir.IntType(32), _LANES)
+    nothing = ir.Constant(VECTOR.code, ir.Undefined)
     first = build.insert_element(nothing, number, ir.Constant(ir.IntType(32), 0))
-    return build.shuffle_vector(first, nothing, ir.Constant(places, [0] * kind.count))
+    return build.shuffle_vector(first, nothing, ir.Constant(places, [0] * _LANES))
 
 
 def _arithmetic(instruction: str) -> Lower:
     def lower(build: Any, kinds: Any, arguments: Any) -> Any:
-        own = _common(*kinds)
         both = [
-            given if isinstance(kind, VectorType) else _same(build, own, given)
+            given if isinstance(kind, VectorType) else _same(build, given)
             for kind, given in zip(kinds, arguments, strict=True)
         ]
         return getattr(build, instruction)(*both, flags=_FUSED)
@@ -137,24 +129,19 @@ def _arithmetic(instruction: str) -> Lower:
     return lower
 
 
-def _at(build: Any, kind: VectorType, data: Any, i: Any) -> Any:
-    return build.bitcast(build.gep(data, [i]), kind.code.as_pointer())
+def _at(build: Any, data: Any, i: Any) -> Any:
+    return build.bitcast(build.gep(data, [i]), VECTOR.code.as_pointer())
 
 
-def _load(build: Any, kinds: Any, arguments: Any) -> Any:
-    kind = _of(*kinds)
-    loaded = build.load(_at(build, kind, *arguments))
-    loaded.align = kind.number.bitwidth // 8
+def _load(build: Any, _kinds: Any, arguments: Any) -> Any:
+    loaded = build.load(_at(build, *arguments))
+    loaded.align = _BYTES
     return loaded
 
 
-def _store(build: Any, kinds: Any, arguments: Any) -> None:
-    kind = _of(*kinds)
+def _store(build: Any, _kinds: Any, arguments: Any) -> None:
     data, i, value = arguments
-    if kinds[2] is not kind:  # numbers in double precision to an array in single: half a vector of it
-        value = build.fptrunc(value, ir.VectorType(kind.code.element, kinds[2].count))
-    place = build.bitcast(build.gep(data, [i]), value.type.as_pointer())
-    build.store(value, place).align = kind.number.bitwidth // 8
+    build.store(value, _at(build, data, i)).align = _BYTES
 
 
 def _fetch(build: Any, _kinds: Any, arguments: Any) -> None:
@@ -169,9 +156,9 @@ def _fetch(build: Any, _kinds: Any, arguments: Any) -> None:
 def _folded(join: Callable[[Any, Any, Any], Any]) -> Lower:
     """One number of all: halves are joined until one is left."""
 
-    def lower(build: Any, kinds: Any, arguments: Any) -> Any:
+    def lower(build: Any, _kinds: Any, arguments: Any) -> Any:
         (whole,) = arguments
-        wide = kinds[0].count
+        wide = _LANES
         while wide > 1:
             places = ir.VectorType(ir.IntType(32), wide // 2)
             low, high = (
@@ -179,8 +166,7 @@ def _folded(join: Callable[[Any, Any, Any], Any]) -> Lower:
                 for k in (0, wide // 2)
             )
             whole, wide = join(build, low, high), wide // 2
-        found = build.extract_element(whole, ir.Constant(ir.IntType(32), 0))
-        return build.fpext(found, ir.DoubleType()) if kinds[0] is ROUGH else found
+        return build.extract_element(whole, ir.Constant(ir.IntType(32), 0))
 
     return lower
 
@@ -193,59 +179,48 @@ def _larger_of(build: Any, one: Any, other: Any) -> Any:
     return build.select(build.fcmp_ordered(">", one, other), one, other)
 
 
-def _unary(build: Any, kind: VectorType, name: str, x: Any) -> Any:
-    form = ir.FunctionType(kind.code, [kind.code])
-    letters = f"v{kind.count}f{kind.number.bitwidth}"
-    return build.call(_declared(build, form, f"llvm.{name}.{letters}"), [x])
+def _unary(build: Any, name: str, x: Any) -> Any:
+    form = ir.FunctionType(VECTOR.code, [VECTOR.code])
+    return build.call(_declared(build, form, f"llvm.{name}.v{_LANES}f64"), [x])
 
 
-def _negative(build: Any, kinds: Any, arguments: Any) -> Any:
-    kind = kinds[0]
-    bits = build.bitcast(build.fcmp_ordered("<", arguments[0], _constant(kind, 0.0)), ir.IntType(kind.count))
+def _negative(build: Any, _kinds: Any, arguments: Any) -> Any:
+    bits = build.bitcast(build.fcmp_ordered("<", arguments[0], _constant(0.0)), ir.IntType(_LANES))
     return build.zext(bits, ir.IntType(64))
 
 
-def _unmarked(build: Any, kinds: Any, arguments: Any) -> Any:
-    kind = kinds[0]
+def _unmarked(build: Any, _kinds: Any, arguments: Any) -> Any:
     vector_of, bits = arguments
-    marked = build.bitcast(build.trunc(bits, ir.IntType(kind.count)), ir.VectorType(ir.IntType(1), kind.count))
-    return build.select(marked, _constant(kind, 0.0), vector_of)
+    marked = build.bitcast(build.trunc(bits, ir.IntType(_LANES)), ir.VectorType(ir.IntType(1), _LANES))
+    return build.select(marked, _constant(0.0), vector_of)
 
 
 def _inverse_root(build: Any, kinds: Any, arguments: Any) -> Any:
     x, floor = arguments
     root = _refined if _AVX512 else _divided
-    return _where_larger(build, kinds, (x, floor, root(build, kinds[0], x)))
+    return _where_larger(build, kinds, (x, floor, root(build, x)))
 
 
-def _divided(build: Any, kind: VectorType, x: Any) -> Any:
-    return build.fdiv(_constant(kind, 1.0), _unary(build, kind, "sqrt", x))
+def _divided(build: Any, x: Any) -> Any:
+    return build.fdiv(_constant(1.0), _unary(build, "sqrt", x))
 
 
-def _refined(build: Any, kind: VectorType, x: Any) -> Any:
-    """From a seed y of 14 bits: with e = 1 - x y^2, 1/sqrt(x) = y (1 + e/2 + 3 e^2/8 + 5 e^3/16 + O(2^-54)).
-
-    The first of these terms is enough for single precision.
-    """
-    rough = kind is ROUGH
-    form = ir.FunctionType(kind.code, [kind.code, kind.code, ir.IntType(kind.count)])
-    name = f"llvm.x86.avx512.rsqrt14.p{'s' if rough else 'd'}.512"
-    start = _declared(build, form, name)
-    y = build.call(start, [x, _constant(kind, 0.0), ir.Constant(ir.IntType(kind.count), -1)])
+def _refined(build: Any, x: Any) -> Any:
+    """From a seed y of 14 bits: with e = 1 - x y^2, 1/sqrt(x) = y (1 + e/2 + 3 e^2/8 + 5 e^3/16 + O(2^-54))."""
+    form = ir.FunctionType(VECTOR.code, [VECTOR.code, VECTOR.code, ir.IntType(_LANES)])
+    start = _declared(build, form, "llvm.x86.avx512.rsqrt14.pd.512")
+    y = build.call(start, [x, _constant(0.0), ir.Constant(ir.IntType(_LANES), -1)])
     # other flags would allow e to be taken apart
     fused = ("contract",)
-    e = build.fsub(_constant(kind, 1.0), build.fmul(x, build.fmul(y, y), flags=fused), flags=fused)
-    series = _constant(kind, 0.5)
-    if not rough:
-        series = build.fadd(_constant(kind, 0.375), build.fmul(_constant(kind, 0.3125), e, flags=fused), flags=fused)
-        series = build.fadd(_constant(kind, 0.5), build.fmul(series, e, flags=fused), flags=fused)
+    e = build.fsub(_constant(1.0), build.fmul(x, build.fmul(y, y), flags=fused), flags=fused)
+    series = build.fadd(_constant(0.375), build.fmul(_constant(0.3125), e, flags=fused), flags=fused)
+    series = build.fadd(_constant(0.5), build.fmul(series, e, flags=fused), flags=fused)
     return build.fadd(y, build.fmul(build.fmul(y, e), series, flags=fused), flags=fused)
 
 
-def _where_larger(build: Any, kinds: Any, arguments: Any) -> Any:
-    kind = kinds[0]
+def _where_larger(build: Any, _kinds: Any, arguments: Any) -> Any:
     x, floor, value = arguments
-    return build.select(build.fcmp_ordered(">", x, _same(build, kind, floor)), value, _constant(kind, 0.0))
+    return build.select(build.fcmp_ordered(">", x, _same(build, floor)), value, _constant(0.0))
 
 
 for _signs, _instruction in (
@@ -255,36 +230,19 @@ for _signs, _instruction in (
 ):
     for _sign in _signs:
         for _pair in ((VectorType, VectorType), (VectorType, types.Float), (types.Float, VectorType)):
-            _implement(_sign, _pair, _common, _arithmetic(_instruction))
-
-
-def _count(build: Any, kinds: Any, _arguments: Any) -> Any:
-    return ir.Constant(ir.IntType(64), _of(*kinds).count)
-
-
-def _stored(array: Any, _i: Any, value: Any) -> Any:
-    return types.none if value in (VECTOR, _of(array)) else None
+            _implement(_sign, _pair, _vector, _arithmetic(_instruction))
 
 
 _implement(vector.lanes, (), lambda: types.int64, lambda _build, _kinds, _none: ir.Constant(ir.IntType(64), _LANES))
-_implement(vector.lanes_of, (types.Array,), lambda _array: types.int64, _count)
-_implement(vector.zero, (), lambda: VECTOR, lambda _build, _kinds, _none: _constant(VECTOR, 0.0))
-_implement(vector.zero_of, (types.Array,), _of, lambda _build, kinds, _given: _constant(_of(*kinds), 0.0))
-_implement(vector.load, (types.Array, types.Integer), _of, _load)
-_implement(vector.store, (types.Array, types.Integer, VectorType), _stored, _store)
+_implement(vector.zero, (), _vector, lambda _build, _kinds, _none: _constant(0.0))
+_implement(vector.load, (types.Array, types.Integer), _vector, _load)
+_implement(vector.store, (types.Array, types.Integer, VectorType), lambda *_: types.none, _store)
 _implement(vector.fetch, (types.Array, types.Integer), lambda _array, _i: types.none, _fetch)
 _implement(vector.total, (VectorType,), lambda _whole: types.float64, _folded(_sum_of))
 _implement(vector.largest, (VectorType,), lambda _whole: types.float64, _folded(_larger_of))
-_implement(vector.larger, (VectorType, VectorType), _common, lambda build, _kinds, both: _larger_of(build, *both))
-_implement(
-    vector.magnitude, (VectorType,), _common, lambda build, kinds, given: _unary(build, kinds[0], "fabs", given[0])
-)
-_implement(vector.inverse_root, (VectorType, types.Float), lambda kind, _floor: kind, _inverse_root)
-_implement(
-    vector.where_larger,
-    (VectorType, types.Float, VectorType),
-    lambda x, _floor, value: _common(x, value),
-    _where_larger,
-)
+_implement(vector.larger, (VectorType, VectorType), _vector, lambda build, _kinds, both: _larger_of(build, *both))
+_implement(vector.magnitude, (VectorType,), _vector, lambda build, _kinds, given: _unary(build, "fabs", given[0]))
+_implement(vector.inverse_root, (VectorType, types.Float), _vector, _inverse_root)
+_implement(vector.where_larger, (VectorType, types.Float, VectorType), _vector, _where_larger)
 _implement(vector.negative, (VectorType,), lambda _vector: types.int64, _negative)
-_implement(vector.unmarked, (VectorType, types.Integer), lambda vector, _bits: vector, _unmarked)
+_implement(vector.unmarked, (VectorType, types.Integer), _vector, _unmarked)

@@ -55,7 +55,7 @@ from mdstopo.integrators.steps import (
 from mdstopo.mechanics.active_members import active_members
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.kinematics.planar_forces import add_loads
-from mdstopo.mechanics.kinematics.planar_poses import DX, DY, POSE, copy_rows, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, copy_rows, relative_pose
 from mdstopo.mechanics.kinematics.planar_scales import (
     deflection,
     gross_loads,
@@ -65,7 +65,6 @@ from mdstopo.mechanics.kinematics.planar_scales import (
     rounding_of_pairs,
 )
 from mdstopo.mechanics.passes import K_XX, K_YY, STORED, SUMS, scale_members
-from mdstopo.mechanics.single_precision import may_use_single_precision, single_precision_forces
 from mdstopo.scene.packing import unpack
 
 GaussSteps = namedtuple("GaussSteps", FIELDS)  # type: ignore[misc]
@@ -77,9 +76,6 @@ MOST = max(LEVELS)
 FIRST_LEVEL = 0
 #: radians of the fastest vibration that the first window may span, so that the sweeps contract
 LONGEST = 6.0
-#: the first pass is made in single precision from this Newton tolerance on, where the bodies move by that share of
-#: their distance and reach
-SINGLE_TOLERANCE, SINGLE_SHARE = 1e-7, 0.05
 #: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
 SLOW = 0.26
 MOST_CAUTIOUS = 100.0
@@ -209,9 +205,6 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         q_base[d] = q0[d]
         v_base[d] = v0[d]
         load_base[d] = 0.0
-    may_begin_in_single_precision = (
-        fixed_step <= 0.0 and newton_tolerance >= SINGLE_TOLERANCE and may_use_single_precision(model)
-    )
     t = times[0]
     t_node[0] = t
     forces(model, strength, np.int64(0), np.int64(1), t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
@@ -281,12 +274,8 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
             # nothing has moved yet: what the start's forces alone would do is the scale of the prediction
             integrate_to_nodes(planes[2], s, s, h * h, q0, hv0, planes[0, 0], a, q)
             relative_pose(pair, model.home, q[s - 1], v0, rel[s - 1])
-            single_precision = may_begin_in_single_precision
             for p in range(n_pair):
                 scale[p] = max(motion[p], deflection(rel[s - 1], rel0, reach, p), 1e3 * noise[p])
-                single_precision = single_precision and scale[p] > SINGLE_SHARE * (
-                    np.sqrt(rel0[p, DX] ** 2 + rel0[p, DY] ** 2) + reach[p]
-                )
             motion_weights(pair, rel0, reach, scale, weight)
             accepted = False
             estimate = 0.0
@@ -297,17 +286,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                     # one pass over the members at all nodes
                     take_rows(q, s, ref[0])
                     take_rows(v, s, ref[1])
-                    single_precision = (
-                        single_precision
-                        and newton == 1
-                        and single_precision_forces(
-                            model, strength, segment, s, t_node, ref[0], ref[1], rel, sums, f, k, c, turn
-                        )
-                    )
-                    if not single_precision:
-                        forces(
-                            model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn
-                        )
+                    forces(model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
                     work[FORCES] += s
                     work[TANGENTS] += s
                     work[NEWTON] += 1
@@ -340,7 +319,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                 estimate *= caution(coef, weight, s) * lasting(h, longest)
                 if estimate <= tolerance or fixed_step > 0.0:
                     # the last clause: rounding is all that is left
-                    if not single_precision and (e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11)):
+                    if e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11):
                         accepted = True
                         break
                     previous = e

@@ -14,7 +14,6 @@ from mdstopo.compiler.vector import (
     fetch,
     inverse_root,
     lanes,
-    lanes_of,
     larger,
     largest,
     load,
@@ -25,7 +24,6 @@ from mdstopo.compiler.vector import (
     unmarked,
     where_larger,
     zero,
-    zero_of,
 )
 from mdstopo.integrators.rows import largest_difference, row_width
 from tests.compiled import compiled
@@ -57,12 +55,6 @@ def _chosen(x, value, out):
 
 
 @compiled
-def _shortened(x, out):
-    for i in range(0, len(x), lanes()):
-        store(out, i, load(x, i))
-
-
-@compiled
 def _mixed(x, y, out):
     sums = zero()
     most = zero()
@@ -89,19 +81,6 @@ def _spared(x, bits, out):
     fetch(x, 0)
     fetch(out, len(out))  # behind the end, where there may be nothing
     store(out, 0, unmarked(load(x, 0), bits))
-
-
-@compiled
-def _in_kind(x, y, out):
-    sums = zero_of(x)
-    most = zero_of(x)
-    for i in range(0, len(x), lanes_of(x)):
-        a = load(x, i)
-        b = a * 2.0 - load(y, i) * inverse_root(a * a, FLOOR)
-        store(out, i, b)
-        sums += b
-        most = larger(magnitude(b), most)
-    return lanes_of(x), total(sums), largest(most)
 
 
 @compiled
@@ -139,14 +118,6 @@ def test_values_are_those_of_arrays_where_there_is_more_than_the_floor():
     np.testing.assert_array_equal(out, where_larger(x, FLOOR, value))
 
 
-def test_numbers_are_shortened_into_an_array_of_single_precision():
-    x = np.random.default_rng(9).normal(size=64)
-    out = np.full(66, 7.0, np.float32)
-    _shortened(x, out[1:65])
-    np.testing.assert_array_equal(out[1:65], x.astype(np.float32))
-    assert out[0] == out[65] == 7.0
-
-
 def test_operators_are_those_of_arrays():
     rng = np.random.default_rng(5)
     x, y = rng.normal(size=(2, 64))
@@ -175,20 +146,6 @@ def test_marked_lanes_become_zero_whatever_they_hold():
         _spared(x, bits, out)
         assert np.array_equal(out, unmarked(x, bits), equal_nan=True)
         assert np.array_equal(out == 0.0, (bits >> np.arange(width)) & 1 == 1)
-
-
-@pytest.mark.parametrize("kind", [np.float32, np.float64])
-def test_vectors_are_of_their_array_s_precision(kind):
-    rng = np.random.default_rng(6)
-    x, y = rng.normal(size=(2, 64)).astype(kind)
-    out = np.empty(64, kind)
-    width, sums, most = _in_kind(x, y, out)
-    assert width * out.itemsize == _width() * 8
-    rounding = 4.0 * float(np.finfo(kind).eps)
-    exact = 2.0 * x.astype(np.longdouble) - y.astype(np.longdouble) / np.abs(x.astype(np.longdouble))
-    assert (np.abs(out - exact) < rounding * (2.0 * np.abs(x) + np.abs(y / x))).all()
-    assert sums == pytest.approx(out.sum(dtype=np.float64), abs=rounding * float(np.abs(out).sum()))
-    assert most == np.abs(out).max()
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -221,10 +178,8 @@ def test_processors_without_the_widest_vectors_get_the_same_numbers(narrow):
         "own.test_inverse_roots_are_right_to_rounding_over_the_whole_range()\n"
         "own.test_inverse_roots_are_zero_up_to_the_floor_and_of_what_is_no_number()\n"
         "own.test_values_are_those_of_arrays_where_there_is_more_than_the_floor()\n"
-        "own.test_numbers_are_shortened_into_an_array_of_single_precision()\n"
         "own.test_operators_are_those_of_arrays()\n"
         "own.test_marked_lanes_become_zero_whatever_they_hold()\n"
-        "own.test_vectors_are_of_their_array_s_precision(np.float32)\n"
         "own.test_a_number_lost_anywhere_is_seen(np.nan)\n"
     )
     stated = {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX"}

@@ -12,7 +12,6 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.kernel import Kernel
-from mdstopo.mechanics.angles import small_turn
 from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_vjp
 from mdstopo.mechanics.joints.revolute import place_joint as place_joint_of_bodies
 from mdstopo.mechanics.joints.table import joint_acceleration_slopes as acceleration_slopes_by_code
@@ -48,6 +47,7 @@ from mdstopo.mechanics.kinematics.planar_poses import (
     VX,
     VY,
     fill_pose,
+    small_turn,
     turned_from,
 )
 from mdstopo.mechanics.kinematics.planar_poses import (

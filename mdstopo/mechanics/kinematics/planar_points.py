@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.mechanics.angles import small_turn
 from mdstopo.mechanics.kinematics.components import ACCELERATION, ACROSS, DISPLACEMENT, VELOCITY, X, Y
+from mdstopo.mechanics.kinematics.planar_poses import small_turn
 
 
 @kernel

@@ -10,14 +10,22 @@ tells by how much it differs from the one at home, too, without forming the diff
 digits of members that hardly stretch.
 """
 
+import math
+
 from mdstopo.compiler.jit import part
-from mdstopo.mechanics.angles import small_turn
 from mdstopo.scene.model import HOME_COS, HOME_SIN, HOME_X, HOME_Y
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A, then what has changed since
 #: home: d - d_0, cos theta - cos theta_0, sin theta - sin theta_0
 DX, DY, COS, SIN, VX, VY, VT, COS_A, SIN_A, OMEGA_A, UX, UY, UC, US = range(14)
 POSE = 14
+
+
+@part
+def small_turn(angle):
+    """cos - 1 and sin of an angle, rad; the first as -2 sin^2(angle/2), which loses no digits of a small angle."""
+    half = math.sin(0.5 * angle)
+    return -2.0 * half * half, math.sin(angle)
 
 
 @part

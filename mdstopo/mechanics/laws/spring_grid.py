@@ -158,8 +158,9 @@ def _weight(energy, seen, moved, k, l0, excess, at, close):
 
 
 @part
-def no_members(nothing):
+def no_members():
     """Sums over the members of a column: w, w r, and of g n n^T xx, xy and the trace; of none."""
+    nothing = zero()
     return nothing, nothing, nothing, nothing, nothing, nothing
 
 
@@ -181,8 +182,9 @@ def add_member(own, rx, ry, y, w, g):
 
 
 @part
-def no_columns(nothing):
+def no_columns():
     """Sums over columns: -Q, w and w a, and xx, xy, yy, xt, yt, tt of what K has besides these; of none."""
+    nothing = zero()
     return (
         (nothing, nothing, nothing),
         (nothing, nothing, nothing),
@@ -238,15 +240,14 @@ def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, ro
     """
     begin_rows(px, py, width, r[0], r[1], room)
     nothing_moved = zero(), zero(), zero()
-    nothing = zero()
-    sums = no_columns(nothing)
-    energy = nothing
+    sums = no_columns()
+    energy = zero()
     ax, ay = turned_columns(qx, qy, first, r[2], r[3])
     seen = _seen(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
         bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
         moved = moved_columns(qx, qy, i, r) if close else nothing_moved
-        own = no_members(nothing)
+        own = no_members()
         at = i
         for j in range(1, room.shape[0]):
             following = _seen(ax, ay, room, j)
