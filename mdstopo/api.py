@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case
+from mdstopo.case.sensitivities import AUTO_SENSITIVITY, names
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import ErrorEstimate, Evaluation, FloatArray, Peak
 from mdstopo.evaluators import evaluator_of
@@ -41,7 +42,7 @@ __all__ = [
     "simulate",
 ]
 
-METHODS = ("auto", "adjoint", "direct", "iterative", "constant_load")
+METHODS = tuple(names())
 
 #: compiled cases kept, the most recently used last; each evaluator holds its case, so an id is never taken twice
 _KEPT = 8
@@ -131,7 +132,7 @@ def evaluate(
     if method not in METHODS:
         raise ValueError(f"no sensitivity method {method!r}; there are: {', '.join(METHODS)}")
     evaluator, design = _evaluator(case), _design(case, alpha, variables)
-    chosen = None if method == "auto" else method
+    chosen = None if method == AUTO_SENSITIVITY else method
     found = evaluator.evaluate(design, gradient, chosen)
     return evaluator.with_errors(design, found, chosen) if error_estimate else found
 

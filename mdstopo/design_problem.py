@@ -158,7 +158,7 @@ class DesignProblem:
                 rows, gradients = self.scalarisation.rows(parts)
             except NotPositiveError as error:
                 name = self._objectives[error.args[0]].name
-                message = f"objective {name}, which weighted_product needs to be positive"
+                message = f"objective {name}, which {self.scalarisation.method} needs to be positive"
                 return Sample(np.inf, status=Status.NOT_POSITIVE, message=message, info=info)
             if len(self.scalarisation.planes):
                 own, own_slopes = self.scalarisation.limits(parts)

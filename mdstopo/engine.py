@@ -16,6 +16,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, STIFF
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
+from mdstopo.case.sensitivities import SENSITIVITIES, chosen
 from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
@@ -27,7 +28,7 @@ from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs, collocates
 from mdstopo.scene.modes import Modes
 from mdstopo.scene.origin import extent_of, origin_of, seen_from, starting_places
-from mdstopo.scene.refusals import BY_PARAMETERS, no_derivatives, refusals
+from mdstopo.scene.refusals import no_derivatives, refusals
 from mdstopo.scene.settled import Settled
 from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.sensitivity.springs_driver import SPRINGS
@@ -71,10 +72,14 @@ class Evaluator:
         self.case = case
         self.beyond = beyond_springs(case) or beyond
         self._usual = choose(case.solver, self.beyond, collocates(case))
-        self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
+        self.sensitivity = chosen(case.solver.sensitivity).name
         kind = INTEGRATORS[self._usual[0]]
-        # whether `auto` has to give way to the steps that the iterative method is defined on
-        self._gives_way = case.solver.integrator == AUTO and not kind.iterative
+        # steps on which some methods of differentiation are defined, to which the choice of `auto` has to give way
+        self._lacking = {
+            each.name
+            for each in SENSITIVITIES.values()
+            if case.solver.integrator == AUTO and each.steps and not getattr(kind, each.steps)
+        }
         self._may_be_coarse = case.solver.step is not None and kind.finds_step
         self._compiles_beside = beside
         self._beside = Beside(kind.name, share) if beside and not self.beyond else None
@@ -154,24 +159,24 @@ class Evaluator:
         """Objectives, and on demand gradients, of a design alpha (N,), finite and >= 0 (ValueError otherwise).
 
         Behind alpha there may be the values (P,) of the case's variables; else these have their initial ones.
-        sensitivity: one of the four methods; default the case's. rows: which peaks are told, and what of them;
+        sensitivity: one of the methods; default the case's. rows: which peaks are told, and what of them;
         constant_load tells no `Peak.across`.
         """
         method = sensitivity or self.sensitivity
-        if gradient and self.case.variables and method not in BY_PARAMETERS:
+        if gradient and self.case.variables and not SENSITIVITIES[method].by_parameters:
             raise CaseError(
                 [self.case.marks.mistake(*no_derivatives(self.case, method))],
                 str(self.case.path or self.case.name),
             )
-        if method == "iterative" and self._gives_way:
-            return self.otherwise(sensitivity="iterative").evaluate(alpha, gradient, method, rows)
+        if method in self._lacking:
+            return self.otherwise(sensitivity=method).evaluate(alpha, gradient, method, rows)
         seen = self._seen  # first: a driver that is made may simulate a design of its own
         stated = self._design.take(alpha)
         design, design_map = self.computed(stated), self._design_map
         edge = self._without_slope(stated, gradient)
         nowhere = "" if design_map is None else design_map.why_not(False)
         gradient = gradient and not edge
-        exact = gradient and method == "adjoint"
+        exact = gradient and SENSITIVITIES[method].comes_with_values
         status, message, grazing = Status.OK, "", ""
         looked: dict[str, tuple[Peak, ...]] = {}
         work: list[list[int]] = []
@@ -236,8 +241,9 @@ class Evaluator:
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
         """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors, or why not."""
-        if (sensitivity or self.sensitivity) == "iterative" and self._gives_way:
-            return self.otherwise(sensitivity="iterative").with_errors(alpha, found, sensitivity)
+        method = sensitivity or self.sensitivity
+        if method in self._lacking:
+            return self.otherwise(sensitivity=method).with_errors(alpha, found, sensitivity)
         errors = self._estimator.errors(self.design(alpha), found, sensitivity)
         return found._replace(errors=errors, message=found.message or self._estimator.why)
 

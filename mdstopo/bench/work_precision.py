@@ -16,16 +16,17 @@ from mdstopo.bench.scenes import plate
 from mdstopo.bench.tables import Table, significant
 from mdstopo.bench.timing import interleaved
 from mdstopo.case.errors import CaseError
+from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.plots.style import COLOURS, MARKERS, new_figure, save, styled
 from mdstopo.scene.family import beyond_springs
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
-#: generalized_alpha is of second order: tighter ones would take minutes
+#: with fixed steps of second order tighter ones would take minutes
 TOLERANCES_FIXED = (1e-2, 1e-3, 1e-4, 1e-5)
 TIGHTEST = 1e-13
-METHODS = ("adjoint", "direct")
 _ROUNDS = 5
 
 
@@ -59,8 +60,10 @@ def work_precision(case: Case, tell: Callable[[str], None] = print) -> Iterator[
     ways: dict[tuple[str, str, float], tuple[float, float, int]] = {}
     calls: dict[tuple[str, str, float], Callable[[], object]] = {}
     for integrator, reference in truth.items():
-        methods = (*METHODS, "iterative") if integrator == "generalized_alpha" else METHODS
-        for tolerance in TOLERANCES_FIXED if integrator == "generalized_alpha" else TOLERANCES:
+        kind = INTEGRATORS[integrator]
+        exact = [each for each in SENSITIVITIES.values() if each.is_exact]
+        methods = [each.name for each in exact if not each.steps or getattr(kind, each.steps)]
+        for tolerance in TOLERANCES if kind.adaptive else TOLERANCES_FIXED:
             varied = with_solver(case, integrator, tolerance)
             for method in methods:
                 try:
@@ -80,7 +83,7 @@ def work_precision(case: Case, tell: Callable[[str], None] = print) -> Iterator[
 def with_solver(case: Case, integrator: str, tolerance: float) -> Case:
     """The same case on another integrator, to another tolerance, with steps of the integrator's own choice."""
     solver = replace(case.solver, integrator=integrator, tolerance=tolerance, sensitivity="auto", step=None)
-    if integrator != "generalized_alpha":
+    if not INTEGRATORS[integrator].has_radius:
         solver = replace(solver, spectral_radius=None)
     return replace(case, solver=solver)
 

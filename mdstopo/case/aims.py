@@ -9,6 +9,7 @@ import numpy as np
 
 from mdstopo.case.arrays import Components, FloatArray, FrozenDict, read_only
 from mdstopo.case.value import Value, frozen
+from mdstopo.settings.optimizer_presets import DEFAULT_OPTIMIZER
 
 
 def _none() -> FloatArray:
@@ -184,7 +185,7 @@ class Combine(Value):
 class OptimizerSettings(Value):
     """The `optimizer` section; options: the optimiser's single settings that the file overrides."""
 
-    name: str = "gsao"
+    name: str = DEFAULT_OPTIMIZER
     preset: str = "default"
     max_iterations: int = 200
     tolerance: float = 1e-6

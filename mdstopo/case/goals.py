@@ -21,6 +21,7 @@ from mdstopo.case.stages import check_powers, lowest, powers_of
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.volume import check_feasible
 from mdstopo.case.words import inside, listed, number_text, shown
+from mdstopo.settings.scalarisations import SCALARISATIONS
 
 DESIGN_KEYS = ("initial", "lower", "upper", "power")
 DESIGN_DEFAULTS = {"initial": 0.1, "lower": 0.001, "upper": 1.0, "power": 1.0}
@@ -273,8 +274,9 @@ def build_combine(top: Fields, reading: Reading) -> Combine | None:
 
 def _warn_ignored(fields: Fields, reading: Reading) -> None:
     method = fields["method"]
-    if "exponent" in fields.stated and method != "weighted_exponential":
+    kind = SCALARISATIONS[method]
+    if "exponent" in fields.stated and not kind.takes_exponent:
         reading.warning(inside(fields.path, "exponent"), f"the method {method} ignores exponent")
-    if "normalize" in fields.stated and fields["normalize"] and method == "weighted_product":
+    if "normalize" in fields.stated and fields["normalize"] and not kind.scaled:
         message = f"the method {method} ignores normalize: it takes raw values"
         reading.warning(inside(fields.path, "normalize"), message)

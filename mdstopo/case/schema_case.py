@@ -46,10 +46,15 @@ from mdstopo.case.schema_scene import (
     parameter_words,
 )
 from mdstopo.case.schema_uncertainty import UNCERTAINTY
+from mdstopo.case.sensitivities import AUTO_SENSITIVITY
+from mdstopo.case.sensitivities import names as sensitivities
 from mdstopo.case.value import frozen
+from mdstopo.case.words import listed
 from mdstopo.settings.optimizer_options import OPTIONS
-from mdstopo.settings.optimizer_presets import PRESETS
+from mdstopo.settings.optimizer_presets import DEFAULT_OPTIMIZER, PRESETS
 from mdstopo.settings.optimizers import names as optimizers
+from mdstopo.settings.scalarisations import DEFAULT_SCALARISATION, taking_exponent
+from mdstopo.settings.scalarisations import names as scalarisations
 
 # Design, objectives, constraints.
 
@@ -227,25 +232,22 @@ OBJECTIVE = Record(
     ),
     doc="What is to be improved: a response, made a number.",
 )
-_METHODS = explained(
-    {
-        "weighted_exponential": "U = sum w g^p (Eq. 23), continued oddly below zero",
-        "weighted_sum": "U = sum w g",
-        "weighted_min_max": "U = max w g",
-        "weighted_product": "U = prod G^w of raw values, which must be positive",
-    }
-)
 COMBINE = Record(
     "how objectives are combined",
     (
-        Key("method", _METHODS, "how the objectives g (Eq. 24 of G) become one U", default="weighted_exponential"),
+        Key(
+            "method",
+            explained(scalarisations()),
+            "how the objectives g (Eq. 24 of G) become one U",
+            default=DEFAULT_SCALARISATION,
+        ),
         Key(
             "weights",
             ByName("objective", NOT_NEGATIVE, "number"),
             "of every objective; not all zero; scaled to the sum 1",
             required=True,
         ),
-        Key("exponent", Number(minimum=1), "p of Eq. 23, for weighted_exponential", default=2.0),
+        Key("exponent", Number(minimum=1), f"p of Eq. 23, for {listed(taking_exponent())}", default=2.0),
         Key("normalize", Flag(), "take g of Eq. 24, between utopia and maximum; false: raw values", default=True),
     ),
     doc="How several objectives become one.",
@@ -301,7 +303,7 @@ _OPTIMIZERS = OpenWord(tuple(optimizers()), "", tuple(optimizers().values()), op
 OPTIMIZER = Record(
     "optimizer settings",
     (
-        Key("name", _OPTIMIZERS, "method", default="gsao"),
+        Key("name", _OPTIMIZERS, "method", default=DEFAULT_OPTIMIZER),
         Key("preset", explained({name: _PRESETS[name] for name in PRESETS}), "named settings", default="default"),
         Key(
             "max_iterations",
@@ -327,15 +329,6 @@ OPTIMIZER = Record(
     doc="How the design is improved. Single settings override the preset's.",
 )
 _INTEGRATORS = OpenWord(tuple(integrators()), "", tuple(integrators().values()), integrators)
-_SENSITIVITIES = explained(
-    {
-        "auto": "adjoint",
-        "adjoint": "the exact gradient by a reverse sweep; its cost does not grow with the number of members",
-        "direct": "the same, carried forward; its cost grows with the number of members",
-        "iterative": "the same on the steps of generalized_alpha, by fixed-point sweeps",
-        "constant_load": "inertia and loads frozen at the peak: an approximation",
-    }
-)
 SOLVER = Record(
     "solver settings",
     (
@@ -353,7 +346,7 @@ SOLVER = Record(
             "of generalized_alpha: 1 keeps high frequencies, 0 damps them out in a step",
             otherwise="0.8",
         ),
-        Key("sensitivity", _SENSITIVITIES, "how gradients are computed", default="auto"),
+        Key("sensitivity", explained(sensitivities()), "how gradients are computed", default=AUTO_SENSITIVITY),
         Key("assemble", Flag(), "move the start to the nearest one that fits the joints", default=False),
         Key("settle", Flag(), "move the start to the static equilibrium nearby, with each design anew", default=False),
     ),

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind, Number, Schema, explained
+from mdstopo.case.measures import having
+from mdstopo.case.measures import names as measures
 from mdstopo.case.nodes import MAPPING, SEQUENCE, Node
 from mdstopo.case.number_rows import Rows
 from mdstopo.case.reading import BAD, Reading, found
 from mdstopo.case.records import ByName, Key, Named, Record
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import inside
+from mdstopo.case.words import inside, listed
 
 
 @frozen
@@ -113,21 +115,12 @@ _SCENARIO = Record(
     ),
     doc="Values that occur together. Every scenario meets the whole sample of the numbers.",
 )
-_MEASURES = explained(
-    {
-        "mean": "the mean of all values",
-        "mean_deviation": "the mean and `factor` standard deviations towards the worse",
-        "worst": "the worst of all values",
-        "quantile": "what the share `level` of all values reaches or betters",
-        "nominal": "the value of the case as it is written, without anything uncertain",
-    }
-)
 _MEASURE = Record(
     "a measure",
     (
-        Key("measure", _MEASURES, "what becomes of the values at all points of the sample", required=True),
-        Key("factor", NOT_NEGATIVE, "k of mean_deviation", otherwise="1"),
-        Key("level", Number(above=0, maximum=1), "of quantile; 1 is the worst", otherwise="0.9"),
+        Key("measure", explained(measures()), "what becomes of the values at all points of the sample", required=True),
+        Key("factor", NOT_NEGATIVE, f"k of {listed(having('factor'))}", otherwise="1"),
+        Key("level", Number(above=0, maximum=1), f"of {listed(having('level'))}; 1 is the worst", otherwise="0.9"),
     ),
     doc="One number of many. Worse is larger where an objective is minimised or a limit is kept, else smaller.",
 )

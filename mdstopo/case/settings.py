@@ -6,10 +6,11 @@ import math
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.integrators import AUTO, INTEGRATORS
+from mdstopo.case.integrators import AUTO, INTEGRATORS, having
 from mdstopo.case.loading import Window
 from mdstopo.case.model import OptimizerSettings, SolverSettings
 from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.sensitivities import chosen
 from mdstopo.case.words import count_text, inside, listed, number_text
 from mdstopo.settings.optimizer_options import OPTIONS
 from mdstopo.settings.optimizers import OPTIMIZERS
@@ -28,10 +29,11 @@ def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> Sol
         return SolverSettings()
     integrator, sensitivity = fields["integrator"], fields["sensitivity"]
     step, tolerance = fields["step"], fields["tolerance"]
-    if sensitivity == "iterative" and integrator in INTEGRATORS and not INTEGRATORS[integrator].iterative:
+    needed = _steps_needed(fields)
+    if needed and integrator in INTEGRATORS and not getattr(INTEGRATORS[integrator], needed):
         reading.mistake(
             inside(fields.path, "sensitivity"),
-            f"iterative does not go with the integrator {integrator}: it needs generalized_alpha (or auto)",
+            f"{sensitivity} does not go with the integrator {integrator}: it needs {listed(having(needed))} (or auto)",
         )
     if step is not None and step is not BAD:
         _check_step(fields, [window.end - window.start for window in times.values() if window.good], reading)
@@ -69,11 +71,17 @@ def _check_step(fields: Fields, spans: list[float], reading: Reading) -> None:
         )
 
 
+def _steps_needed(fields: Fields) -> str:
+    """The capability that the method of differentiation needs of the integrator, or nothing."""
+    sensitivity = fields["sensitivity"]
+    return "" if sensitivity is BAD else chosen(sensitivity).steps
+
+
 def _is_damped(fields: Fields) -> bool:
     """Whether the integrator is one with a spectral radius."""
     integrator: str = fields["integrator"]
     if integrator == AUTO:
-        return str(fields["sensitivity"]) == "iterative"
+        return bool(_steps_needed(fields))
     return integrator in INTEGRATORS and INTEGRATORS[integrator].has_radius
 
 

@@ -8,6 +8,7 @@ from dataclasses import field
 from typing import ClassVar
 
 from mdstopo.case.arrays import FrozenDict
+from mdstopo.case.measures import MEASURES, MeasureKind
 from mdstopo.case.value import Value, frozen
 
 
@@ -110,7 +111,7 @@ class Scenario(Value):
 
 @frozen
 class Measure(Value):
-    """What values become: mean | mean_deviation (with factor) | worst | quantile (with level) | nominal."""
+    """What values become: name of a record of `case.measures`, with `factor` and `level` where these are part of it."""
 
     name: str
     factor: float = 0.0
@@ -119,9 +120,17 @@ class Measure(Value):
     @property
     def words(self) -> str:
         """In words."""
-        if self.name == "mean_deviation":
-            return f"mean and {self.factor:g} deviations"
-        return f"{self.level:g} quantile" if self.name == "quantile" else self.name
+        return self.kind.in_words.format(factor=self.factor, level=self.level)
+
+    @property
+    def kind(self) -> MeasureKind:
+        """Its record."""
+        return MEASURES[self.name]
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether it is of the points of a sample; else of the case as it is written."""
+        return bool(self.kind.made_by)
 
 
 @frozen

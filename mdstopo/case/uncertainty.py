@@ -8,6 +8,7 @@ from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.key_paths import led_to, number_at, stands, why_fixed
+from mdstopo.case.measures import MEASURES, OF_LIMITS, OF_OBJECTIVES, having
 from mdstopo.case.model import ResponseRow, VolumeRow
 from mdstopo.case.nodes import Node
 from mdstopo.case.overrides import WrongPathError, as_yaml, steps_of
@@ -227,21 +228,21 @@ def _settled(key: str, root: Node) -> str:
 def _measure(keys: Any, default: Measure, reading: Reading) -> Measure:
     if not isinstance(keys, Fields) or not keys.good():
         return default
-    name = keys["measure"]
-    for key, owner in (("factor", "mean_deviation"), ("level", "quantile")):
-        if key in keys.stated and name != owner:
-            reading.mistake(inside(keys.path, key), f"{key} belongs to {owner}, not to {name}")
+    kind = MEASURES[keys["measure"]]
+    for key in ("factor", "level"):
+        if key in keys.stated and key not in kind.keys:
+            reading.mistake(inside(keys.path, key), f"{key} belongs to {listed(having(key))}, not to {kind.name}")
     factor = 1.0 if keys["factor"] is None else keys["factor"]
     level = 0.9 if keys["level"] is None else keys["level"]
-    if name == "quantile" and level == 1.0:
-        name = "worst"  # which it is, and a quantile's interval would have no upper end
-    return Measure(name, factor if name == "mean_deviation" else 0.0, level if name == "quantile" else 1.0)
+    if kind.at_level_one and level == 1.0:
+        kind = MEASURES[kind.at_level_one]  # a quantile's interval would have no upper end
+    return Measure(kind.name, factor if "factor" in kind.keys else 0.0, level if "level" in kind.keys else 1.0)
 
 
 def _objectives(fields: Fields, top: Fields, reading: Reading) -> dict[str, Measure]:
     stated = dict(_items(fields["objectives"]))
     named = top["objectives"] if isinstance(top["objectives"], dict) else {}
-    return {name: _measure(stated.get(name), Measure("mean"), reading) for name in named}
+    return {name: _measure(stated.get(name), Measure(OF_OBJECTIVES), reading) for name in named}
 
 
 def _constraints(
@@ -263,11 +264,12 @@ def _constraints(
         row = constraints[place]
         if isinstance(row, VolumeRow):
             reading.mistake(here, f"constraints[{place}] bounds a volume, which is as certain as the design")
-        elif row.sense == "equals" and keys["measure"] not in (BAD, "mean", "nominal"):
-            message = f"found {keys['measure']}, allowed is mean or nominal: not every value can equal a bound"
+        elif row.sense == "equals" and keys["measure"] is not BAD and not MEASURES[keys["measure"]].for_equalities:
+            allowed = " or ".join(kind.name for kind in MEASURES.values() if kind.for_equalities)
+            message = f"found {keys['measure']}, allowed is {allowed}: not every value can equal a bound"
             reading.mistake(inside(here, "measure"), message)
     return {
-        place: _measure(stated.get(place), Measure("mean" if row.sense == "equals" else "worst"), reading)
+        place: _measure(stated.get(place), Measure(OF_OBJECTIVES if row.sense == "equals" else OF_LIMITS), reading)
         for place, row in enumerate(constraints)
         if isinstance(row, ResponseRow)
     }

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mdstopo.case.sensitivities import DEFAULT_SENSITIVITY, SENSITIVITIES, having
 from mdstopo.cli.options import (
     alpha_option,
     announce_compilation,
@@ -36,7 +37,8 @@ if TYPE_CHECKING:
 
     Gradients = dict[str, NDArray[np.float64]]
 
-METHODS = ("adjoint", "direct", "iterative", "constant_load")
+#: methods that are compared where none is named
+USUAL = (DEFAULT_SENSITIVITY, having("of_histories")[0])
 _TIGHT = 1e-12  # solver tolerance for differences: what the integrator leaves of noise is divided by the step
 _SHOWN = 6  # values of a variable that are shown
 
@@ -46,7 +48,7 @@ _SHOWN = 6  # values of a variable that are shown
 @click.option(
     "--method",
     "methods",
-    type=click.Choice(METHODS),
+    type=click.Choice(tuple(SENSITIVITIES)),
     multiple=True,
     help="A method; may be repeated (default: adjoint and direct).",
 )
@@ -104,7 +106,7 @@ def command(
     from mdstopo.store.output_file import output_file
 
     output = Output(json=as_json, quiet=quiet)
-    methods = tuple(dict.fromkeys(methods or ("adjoint", "direct")))
+    methods = tuple(dict.fromkeys(methods or USUAL))
     case = _prepared(output, open_case(case_path, overrides, alpha_path), case_path, methods, history)
     alpha = open_design(alpha_path, case)
     path = result_path(out, case, "gradient")
@@ -143,24 +145,30 @@ def command(
 def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str, ...], history: bool) -> "Case":
     """The case as the methods need it; raises CaseError where they cannot be applied."""
     from mdstopo.case.errors import CaseError
-    from mdstopo.case.integrators import AUTO, FIXED, having
-    from mdstopo.scene.refusals import BY_PARAMETERS, no_derivatives
+    from mdstopo.case.integrators import AUTO
+    from mdstopo.case.integrators import having as integrators_having
+    from mdstopo.case.words import listed
+    from mdstopo.scene.refusals import no_derivatives
 
-    refused = [method for method in methods if method not in BY_PARAMETERS]
+    refused = [method for method in methods if not SENSITIVITIES[method].by_parameters]
     if case.variables and refused:
         raise CaseError([case.marks.mistake(*no_derivatives(case, refused[0]))], str(case_path))
     if not case.is_optimizable:
         key = "members" if case.objectives else "objectives"
         words = "a gradient needs at least one objective and one design variable"
         raise CaseError([case.marks.mistake(key, words)], str(case_path))
-    if history and "direct" not in methods:
-        raise click.UsageError("--history needs --method direct")
-    if "iterative" in methods and case.solver.integrator not in (AUTO, *having("iterative")):
-        words = f"the iterative method does not go with {case.solver.integrator}, only with generalized_alpha"
-        raise CaseError([case.marks.mistake("solver.integrator", words)], str(case_path))
-    if "iterative" in methods and case.solver.integrator == AUTO:
-        output.notice("iterative belongs to generalized_alpha: all methods use that integrator, to be comparable")
-        return replace(case, solver=replace(case.solver, integrator=FIXED))
+    if history and not any(SENSITIVITIES[method].of_histories for method in methods):
+        raise click.UsageError(f"--history needs --method {' or '.join(having('of_histories'))}")
+    for method in methods:
+        if not SENSITIVITIES[method].steps:
+            continue
+        on = integrators_having(SENSITIVITIES[method].steps)
+        if case.solver.integrator not in (AUTO, *on):
+            words = f"the {method} method does not go with {case.solver.integrator}, only with {listed(on)}"
+            raise CaseError([case.marks.mistake("solver.integrator", words)], str(case_path))
+        if case.solver.integrator == AUTO:
+            output.notice(f"{method} belongs to {on[0]}: all methods use that integrator, to be comparable")
+            return replace(case, solver=replace(case.solver, integrator=on[0]))
     return case
 
 

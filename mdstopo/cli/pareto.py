@@ -20,6 +20,7 @@ from mdstopo.cli.options import (
     set_option,
 )
 from mdstopo.cli.output import Output, duration, number
+from mdstopo.settings.scalarisations import SCALARISATIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from mdstopo.case.model import Case
     from mdstopo.front.run_front import Ask, FrontOutcome
 
-METHODS = ("weighted_exponential", "weighted_sum", "weighted_min_max", "weighted_product", "nbi", "nc")
 DEFAULT_CASE = Path("cases/fig7.yaml")
 _POINTS = 21
 #: violation, relative to a constraint's bound, from which a point says so
@@ -43,7 +43,9 @@ STATED = 1e-8
 @click.option(
     "--points", type=click.IntRange(2), metavar="N", help=f"So many evenly spaced points (default {_POINTS})."
 )
-@click.option("--method", type=click.Choice(METHODS), help="How the objectives are combined (default: the case's).")
+@click.option(
+    "--method", type=click.Choice(tuple(SCALARISATIONS)), help="How the objectives are combined (default: the case's)."
+)
 @out_option
 @click.option("--resume", is_flag=True, help="Continue the front in the result file.")
 @overwrite_option

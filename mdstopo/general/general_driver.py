@@ -10,6 +10,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.memory import most_floats, room_factor
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.case.responses import kind_of
+from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.competing_members import compete, members_peaks
 from mdstopo.general.compile import GeneralScene, compile_general
@@ -604,10 +605,10 @@ class GeneralDriver:
         return self.start.settled if self.start is not None and self.settle(alpha) else None
 
     def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
-        """Gradients of what `evaluate` found by `direct`, `iterative` or `constant_load`; cones: tell `across`, too."""
+        """Gradients of what `evaluate` found by a method whose do not come with it; cones: tell `across`, too."""
         from mdstopo.general.methods import differentiate
 
-        tell = cones and method != "constant_load" and self._is_planar
+        tell = cones and SENSITIVITIES[method].tells_norms and self._is_planar
         across = np.zeros_like(looked.gradients) if tell else None
         gradients, message = differentiate(self, method, alpha, looked, across)
         return Differentiated(Status.OK, message, gradients, across)

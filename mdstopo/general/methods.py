@@ -4,13 +4,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.general.extremes import RATE, SIGN, parts, row_of
 from mdstopo.general.quadrature_breakpoints import reduced
 from mdstopo.integrators.scene_driver import ResponseResult
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.model import FloatArray
 from mdstopo.sensitivity.constant_load import DROPPED
-from mdstopo.sensitivity.methods import FALLBACK
+from mdstopo.sensitivity.methods import FALLBACK, implementation
 from mdstopo.sensitivity.reductions import INTEGRALS
 from mdstopo.status import Status
 
@@ -24,22 +25,58 @@ SWEEPS = 200
 def differentiate(
     driver: "GeneralDriver", method: str, alpha: FloatArray, looked: ResponseResult, across: FloatArray | None = None
 ) -> tuple[FloatArray, str]:
-    """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by direct, iterative or
-    constant_load; and what the user should know although it worked.
+    """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by a method whose gradients do not come
+    with the values; and what the user should know although it worked.
 
-    across (n_resp, R, N): is filled, but not by constant_load (`evaluation.Peak.across`).
+    across (n_resp, R, N): is filled, where the method tells that (`evaluation.Peak.across`).
     """
-    gradients, message = np.zeros_like(looked.gradients), ""
-    rows = looked.rows.copy()
+    found: tuple[FloatArray, str] = implementation(SENSITIVITIES[method].general)(driver, alpha, looked, across)
+    return found
+
+
+def by_direct(
+    driver: "GeneralDriver", alpha: FloatArray, looked: ResponseResult, across: FloatArray | None
+) -> tuple[FloatArray, str]:
+    """Gradients carried forward with the motion, as of `differentiate`."""
+    return _carried(driver, alpha, looked, across, 0)
+
+
+def by_iterative(
+    driver: "GeneralDriver", alpha: FloatArray, looked: ResponseResult, across: FloatArray | None
+) -> tuple[FloatArray, str]:
+    """The same by fixed-point sweeps over implicit steps; by `by_direct` where these do not contract."""
+    return _carried(driver, alpha, looked, across, SWEEPS)
+
+
+def by_constant_load(
+    driver: "GeneralDriver", alpha: FloatArray, looked: ResponseResult, across: FloatArray | None
+) -> tuple[FloatArray, str]:
+    """Gradients with inertia and loads frozen; `across` is left as it is."""
+    gradients, rows = np.zeros_like(looked.gradients), looked.rows.copy()
+    count = _run_again(driver, alpha)
+    for j, reduction in enumerate(driver.scene.reductions):
+        for r in range(int(looked.found[j])):
+            gradients[j, r] = _held(driver, j, rows[j, r], reduction, count)
+    return gradients, ""
+
+
+def _run_again(driver: "GeneralDriver", alpha: FloatArray) -> int:
+    """Simulate with tangents, which is not counted as work; how many steps that took."""
     before = driver.work.copy()
     _, count, _ = driver.run(alpha, True, driver.quadrature_breakpoints)
     driver.work += before
+    return count
+
+
+def _carried(
+    driver: "GeneralDriver", alpha: FloatArray, looked: ResponseResult, across: FloatArray | None, sweeps: int
+) -> tuple[FloatArray, str]:
+    """As `by_direct`. sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most."""
+    gradients, message = np.zeros_like(looked.gradients), ""
+    rows = looked.rows.copy()
+    count = _run_again(driver, alpha)
     for j, reduction in enumerate(driver.scene.reductions):
         for r in range(int(looked.found[j])):
-            if method == "constant_load":
-                gradients[j, r] = _held(driver, j, rows[j, r], reduction, count)
-                continue
-            sweeps = SWEEPS if method == "iterative" else 0
             aims = [(False, gradients[j, r])]
             if across is not None and driver.shapes[j] == "norm":
                 aims.append((True, across[j, r]))
@@ -52,7 +89,7 @@ def differentiate(
                     )  # fmt: skip
                     if stopped >= 0:
                         message = FALLBACK.format(float(driver.states()[0][stopped]))
-                        return differentiate(driver, "direct", alpha, looked, across)[0], message
+                        return by_direct(driver, alpha, looked, across)[0], message
                     _add_since_settled(driver, j, part, aside, integrated, count, own)
                     out += factor * own
             if reduction == "max_abs":

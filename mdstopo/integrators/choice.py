@@ -4,8 +4,9 @@ import importlib
 
 import numpy as np
 
-from mdstopo.case.integrators import ADAPTIVE, AUTO, FIXED, INTEGRATORS, SMOOTH
+from mdstopo.case.integrators import ADAPTIVE, AUTO, FIXED, INTEGRATORS, SMOOTH, having
 from mdstopo.case.model import SolverSettings
+from mdstopo.case.sensitivities import chosen
 from mdstopo.integrators.scene_driver import Method
 
 
@@ -17,8 +18,9 @@ def choose(solver: SolverSettings, beyond: str = "", collocates: bool = False) -
     """
     if solver.integrator != AUTO:
         return solver.integrator, "as the case says"
-    if solver.sensitivity == "iterative":
-        return FIXED, "the iterative sensitivity method is defined on its steps"
+    needed = chosen(solver.sensitivity).steps
+    if needed:
+        return having(needed)[0], f"the {solver.sensitivity} sensitivity method is defined on its steps"
     if solver.spectral_radius is not None:
         return FIXED, "a spectral radius is given, which no other method has"
     if beyond and not collocates:

@@ -155,7 +155,7 @@ class SceneDriver(Protocol):
         """Simulate a design and evaluate all responses, and on demand their gradients by the discrete adjoint."""
 
     def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
-        """Gradients of what `evaluate` found by `direct`, `iterative` or `constant_load`; cones: tell `across`, too."""
+        """Gradients of what `evaluate` found by a method whose do not come with it; cones: tell `across`, too."""
 
     def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and the derivative (T, N) of response j at them, by `direct`."""

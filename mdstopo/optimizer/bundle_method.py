@@ -18,9 +18,10 @@ from mdstopo.optimizer.competing_rows import (
     RowModel,
     Trial,
 )
+from mdstopo.optimizer.gsao_state import GsaoState
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
-from mdstopo.optimizer.safeguards import is_least, merit, plain_violation, residual_unit, scaled_violation
-from mdstopo.optimizer.state import State
+from mdstopo.optimizer.safeguards import is_least, residual_unit
+from mdstopo.optimizer.violations import merit, plain_violation, scaled_violation
 from mdstopo.settings.optimizer_presets import Settings
 
 #: the box after the rows were forgotten, and when another piece begins, in ranges
@@ -66,11 +67,11 @@ class BundleMethod:
         self.model = model
         self.settings = settings
 
-    def begin(self, state: State) -> None:
+    def begin(self, state: GsaoState) -> None:
         """Go on from the iterate, with its rows alone and without curvature."""
         self._begin(state)
 
-    def begin_anew(self, state: State, stuck: bool) -> bool:
+    def begin_anew(self, state: GsaoState, stuck: bool) -> bool:
         """Where no further step is found: restore the limits, return to the objective, or drop rows from elsewhere.
 
         stuck: whether the last steps or the next one change next to nothing. Whether a new step is to be proposed.
@@ -90,7 +91,7 @@ class BundleMethod:
             return True
         return stuck and not done and self._reset(state)
 
-    def _begin(self, state: State, penalty: Floats | None = None) -> None:
+    def _begin(self, state: GsaoState, penalty: Floats | None = None) -> None:
         """Begin. penalty (J,): on violations from here on; None: that of `first_penalty`, and none while restoring."""
         sample = state.sample
         state.uses_bundle, state.small = True, 0
@@ -108,20 +109,20 @@ class BundleMethod:
         state.stagnation, state.violation_mark = 0, float("inf")
         state.kkt = float("nan")
 
-    def _restore(self, state: State) -> None:
+    def _restore(self, state: GsaoState) -> None:
         """Make the largest violation the objective."""
         state.restoring, state.resets = True, 0
         state.trust = max(state.trust, RESET_TRUST)
         self._begin(state)
 
-    def _return_to_objective(self, state: State) -> None:
+    def _return_to_objective(self, state: GsaoState) -> None:
         """Go on with the objective, now that limits hold."""
         state.restoring = False
         state.trust = max(state.trust, RETURN_TRUST)
         self._begin(state)
         state.penalty = RESTORED_PENALTY * state.penalty
 
-    def _reset(self, state: State) -> bool:
+    def _reset(self, state: GsaoState) -> bool:
         """Drop rows of other designs, which may forbid what is possible; False where that was done too often here."""
         if state.resets >= RESETS:
             return False
@@ -140,7 +141,7 @@ class BundleMethod:
 
     # -- the steps
 
-    def judge(self, state: State, sample: Sample) -> bool:
+    def judge(self, state: GsaoState, sample: Sample) -> bool:
         """Whether the evaluated trial is accepted, and then the iterate; its rows join the bundle in any case.
 
         Adapts the trust box, the curvature's steps, the concavity, and the counts of steps without decrease.
@@ -176,7 +177,7 @@ class BundleMethod:
             state.take(sample, scaled_violation(sample))
         return accepted
 
-    def propose(self, state: State) -> None:
+    def propose(self, state: GsaoState) -> None:
         """Solve the model and set the next trial, what it promises, and the KKT residual."""
         own = state.bundle.subset(state.bundle.own)
         steepest = float(own.steepest[own.group == 0].max(initial=0.0))
@@ -200,7 +201,7 @@ class BundleMethod:
         enough = CARRIED * np.concatenate([[1.0], state.penalty])
         state.bundle = state.bundle.aged(trial.multipliers, enough)
 
-    def is_exhausted(self, state: State) -> bool:
+    def is_exhausted(self, state: GsaoState) -> bool:
         """Whether the last steps have changed next to nothing, or the model promises no decrease."""
         return state.small >= PATIENCE or not state.predicted > NO_DECREASE * abs(state.objective)
 
@@ -225,7 +226,7 @@ class BundleMethod:
         rows.group[:] = 0
         return rows
 
-    def _learn_curvature(self, state: State, new: Bundle, d: Floats) -> None:
+    def _learn_curvature(self, state: GsaoState, new: Bundle, d: Floats) -> None:
         """Keep the step d (N,) and the change of the Lagrangian's gradient over it, where that can be told."""
         change = self.model.gradient_change(state.bundle, new, d, state.multipliers)
         if change is None or not self.model.lengths(d)[0] > 0.0:
@@ -233,7 +234,7 @@ class BundleMethod:
         state.steps = self.model.learnt(state.steps, d)
         state.changes = self.model.learnt(state.changes, change)
 
-    def _steer(self, state: State, rows: Bundle, around: Around, here: Floats) -> Trial:
+    def _steer(self, state: GsaoState, rows: Bundle, around: Around, here: Floats) -> Trial:
         """The trial, at penalties that make it take away enough of the violation that can go in the box.
 
         Raises `state.penalty` until it does, and else lets it follow the multipliers. here (J + 1,): the groups' levels
@@ -268,7 +269,7 @@ class BundleMethod:
         )
         return trial
 
-    def _count_stagnation(self, state: State, there: Floats) -> None:
+    def _count_stagnation(self, state: GsaoState, there: Floats) -> None:
         """Count iterates whose largest violation is not much below that of the one that the count began with."""
         violation = float(there[1:].max(initial=0.0))
         if violation <= self.settings.tolerance:
@@ -278,7 +279,7 @@ class BundleMethod:
         else:
             state.stagnation += 1
 
-    def _learn_concavity(self, state: State, seen: Bundle, here: Floats, moved: Bundle, there: Floats) -> None:
+    def _learn_concavity(self, state: GsaoState, seen: Bundle, here: Floats, moved: Bundle, there: Floats) -> None:
         """How much each group was seen to bend downwards: a row from one end of a step above the value at the other."""
         state.concavity = CONCAVITY_FALL * state.concavity
         for rows, levels in ((seen, here), (moved, there)):

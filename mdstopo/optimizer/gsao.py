@@ -9,15 +9,18 @@ from typing import Protocol
 
 import numpy as np
 
+from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.bundle_method import RESET_TRUST, BundleMethod
 from mdstopo.optimizer.competing_rows import DenseModel, FeasibleSet
-from mdstopo.optimizer.interface import first_state
+from mdstopo.optimizer.gsao_state import GsaoState, RowDetails, Step
+from mdstopo.optimizer.interface import known_at_first
 from mdstopo.optimizer.nearest_feasible import project
 from mdstopo.optimizer.problem import Floats, Problem, Sample
-from mdstopo.optimizer.safeguards import better, failure, plain_violation, scaled_violation, verdict
+from mdstopo.optimizer.safeguards import failure, no_cuts, verdict
 from mdstopo.optimizer.separable import SeparableMethod
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State
+from mdstopo.optimizer.violations import better, plain_violation, scaled_violation
 from mdstopo.optimizer.wide import Measures, Space, ranges
 from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.optimizer.wide_rows import WideModel
@@ -34,16 +37,16 @@ RETREAT = 0.5
 class Method(Protocol):
     """What makes the steps of the driver, which copies the state before it lets a method change it."""
 
-    def begin(self, state: State) -> None:
+    def begin(self, state: GsaoState) -> None:
         """Go on from the iterate, whatever another method knows."""
 
-    def judge(self, state: State, sample: Sample) -> bool:
+    def judge(self, state: GsaoState, sample: Sample) -> bool:
         """Whether the evaluated trial is accepted, and then the iterate; adapts what depends on that."""
 
-    def propose(self, state: State) -> None:
+    def propose(self, state: GsaoState) -> None:
         """Set the next trial, what it promises, and the KKT residual at the iterate."""
 
-    def is_exhausted(self, state: State) -> bool:
+    def is_exhausted(self, state: GsaoState) -> bool:
         """Whether the last steps have changed next to nothing, or the next one promises nothing."""
 
 
@@ -76,7 +79,7 @@ class Gsao:
             return BundleMethod(DenseModel(space), self.settings)
         return BundleMethod(WideModel(space, self._measures), self.settings) if self.competes else None
 
-    def start(self, initial: Floats | None = None) -> State:
+    def start(self, initial: Floats | None = None) -> GsaoState:
         """Evaluate the (projected) initial design and propose a first step."""
         began = self.clock()
         first = self.problem.initial if initial is None else initial
@@ -94,11 +97,12 @@ class Gsao:
             self._propose(state)
         return self._finish(state, sample, alpha, 0.0, not wrong, began)
 
-    def step(self, state: State) -> State:
+    def step(self, state: State) -> GsaoState:
         """One iteration: evaluate the proposed design, judge it, adapt, and propose the next.
 
         Raises ValueError where the state is not running.
         """
+        assert isinstance(state, GsaoState)
         if not state.running:
             raise ValueError(f"the run has ended: {state.reason}")
         began = self.clock()
@@ -121,22 +125,49 @@ class Gsao:
 
     def terminate(self, state: State) -> tuple[RunStatus, str]:
         """Whether a state goes on, and if not why."""
+        assert isinstance(state, GsaoState)
         return verdict(state, self._is_stuck(state), self.settings)
 
     # The steps of the loop.
 
-    def _first_state(self, alpha: Floats, sample: Sample, failed: bool) -> State:
+    def _first_state(self, alpha: Floats, sample: Sample, failed: bool) -> GsaoState:
         """The state at a first design, before a method begins."""
-        return first_state(
-            alpha,
-            sample,
-            failed,
-            shift=Shifts(np.full(len(alpha), self.settings.number("shift_start"))),
+        n = len(alpha)
+        cuts, cut_gradients = no_cuts(n)
+        return GsaoState(
+            **known_at_first(alpha, sample, failed),
+            rows=sample.rows,
+            gradients=sample.gradients,
+            constraint_rows=sample.constraint_rows,
+            constraint_gradients=sample.constraint_gradients,
+            violation=float("inf") if failed else scaled_violation(sample),
+            row_details=RowDetails.of(sample),
+            cuts=cuts,
+            cut_gradients=cut_gradients,
+            forgotten=float("inf"),
+            predicted=0.0,
+            shift=Shifts(np.full(n, self.settings.number("shift_start"))),
+            step=Step(alpha, alpha),
             trust=self.settings.number("trust_start") if self.settings.flag("trust_region") else 1.0,
             convex=self.settings.number("convex_start"),
+            penalty=np.zeros(0),
+            merit_penalty=np.zeros(0),
+            small=0,
+            failed=0,
+            largest_gradient=0.0,
+            uses_bundle=False,
+            bundle=Bundle.empty(n),
+            multipliers=np.zeros(0),
+            steps=np.zeros((0, n)),
+            changes=np.zeros((0, n)),
+            restoring=False,
+            resets=0,
+            concavity=np.zeros(1),
+            stagnation=0,
+            violation_mark=float("inf"),
         )
 
-    def _judge(self, state: State, sample: Sample) -> bool:
+    def _judge(self, state: GsaoState, sample: Sample) -> bool:
         """Keep the evaluated trial where it is the best so far; whether the method in use accepts it."""
         violation, plain = scaled_violation(sample), plain_violation(sample)
         if better(sample.objective, violation, plain, state, self.settings.tolerance):
@@ -145,20 +176,20 @@ class Gsao:
         state.failed = 0
         return self._method(state).judge(state, sample)
 
-    def _propose(self, state: State) -> None:
+    def _propose(self, state: GsaoState) -> None:
         """Set the next trial; where the method in use gets no further, another one sets it, or the same begun anew."""
         self._method(state).propose(state)
         if self.bundle is not None and state.running and self._change_method(state, self.bundle):
             self._method(state).propose(state)
 
-    def _method(self, state: State) -> Method:
+    def _method(self, state: GsaoState) -> Method:
         """The method that makes the steps now."""
         if not state.uses_bundle:
             return self.separable
         assert self.bundle is not None
         return self.bundle
 
-    def _change_method(self, state: State, bundle: BundleMethod) -> bool:
+    def _change_method(self, state: GsaoState, bundle: BundleMethod) -> bool:
         """Whether the bundle method takes over or begins anew, because the method in use gets no further."""
         stuck = self._is_stuck(state)
         if state.uses_bundle:
@@ -170,13 +201,13 @@ class Gsao:
         bundle.begin(state)
         return True
 
-    def _is_stuck(self, state: State) -> bool:
+    def _is_stuck(self, state: GsaoState) -> bool:
         """Whether the next step would change next to nothing, or the last ones have."""
         if self._move(state) <= self.settings.number("change_tolerance"):
             return True
         return self._method(state).is_exhausted(state)
 
-    def _retreat(self, state: State, wrong: str) -> None:
+    def _retreat(self, state: GsaoState, wrong: str) -> None:
         """After a failed evaluation: a smaller box around the iterate, or the end after too many in a row."""
         state.failed += 1
         state.small = 0
@@ -189,12 +220,12 @@ class Gsao:
                 "the best design so far is kept"
             )
 
-    def _move(self, state: State) -> float:
+    def _move(self, state: GsaoState) -> float:
         return self._measures.change(state.trial, state.alpha)[1]
 
     def _finish(
-        self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
-    ) -> State:
+        self, state: GsaoState, sample: Sample, design: Floats, change: float, accepted: bool, began: float
+    ) -> GsaoState:
         """Write the evaluated design into the history and say whether the run ends. Returns the state.
 
         state: after the iteration; changed here.
@@ -220,7 +251,7 @@ class Gsao:
         return state
 
     @staticmethod
-    def _report_iterate(state: State) -> None:
+    def _report_iterate(state: GsaoState) -> None:
         """What has converged is what is told, where a design before it is better by no more than limits are kept to."""
         if abs(state.objective - state.best_objective) <= EQUAL * abs(state.best_objective):
             state.best_alpha, state.best_objective = state.alpha, state.objective

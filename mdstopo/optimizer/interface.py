@@ -1,20 +1,16 @@
 """The interface of an optimiser, and what is alike for all: making one, driving it, its first state. No mechanics.
 
-One step is one evaluation. Between two steps everything is in `State`, so that the loop can be stopped, stored and
-resumed anywhere without a difference in any bit.
+One step is one evaluation. Between two steps everything is in the state, of a class of the optimiser's own that has the
+fields of `state.State`. So the loop can be stopped, stored and resumed anywhere without a difference in any bit.
 """
 
 import importlib
 from collections.abc import Callable
 from typing import Any, Protocol, cast
 
-import numpy as np
-
-from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.problem import Floats, Problem, Sample
-from mdstopo.optimizer.safeguards import no_cuts, plain_violation, scaled_violation
-from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.state import History, RowDetails, State, Step
+from mdstopo.optimizer.state import History, State
+from mdstopo.optimizer.violations import plain_violation, scaled_violation
 from mdstopo.settings.optimizer_presets import Settings
 from mdstopo.settings.optimizers import OPTIMIZERS
 from mdstopo.status import RunStatus
@@ -33,7 +29,7 @@ class Optimizer(Protocol):
         """
 
     def step(self, state: State) -> State:
-        """The next state, after one evaluation, that of `state.trial`; the given one is left as it is.
+        """The next state, after one evaluation, that of `state.trial`; the given one, its own, is left as it is.
 
         Raises ValueError where the state is not running.
         """
@@ -80,58 +76,24 @@ def run(
     return state
 
 
-def first_state(alpha: Floats, sample: Sample, failed: bool = False, **own: Any) -> State:
-    """The state at a first design, before a method proposes the next.
-
-    own: what an optimiser remembers in other fields of `State` than these; the rest is empty.
-    """
-    n = len(alpha)
-    violation, plain = (float("inf"),) * 2 if failed else (scaled_violation(sample), plain_violation(sample))
-    known: dict[str, Any] = {
+def known_at_first(alpha: Floats, sample: Sample, failed: bool = False) -> dict[str, Any]:
+    """The fields of `State` at a first design, before an optimiser proposes the next; `failed`: it has no values."""
+    infinite = float("inf")
+    return {
         "alpha": alpha,
         "objective": sample.objective,
-        "rows": sample.rows,
-        "gradients": sample.gradients,
-        "constraint_rows": sample.constraint_rows,
-        "constraint_gradients": sample.constraint_gradients,
-        "violation": violation,
-        "cuts": no_cuts(n)[0],
-        "cut_gradients": no_cuts(n)[1],
-        "forgotten": float("inf"),
         "trial": alpha,
-        "predicted": 0.0,
         "kkt": float("nan"),
-        "shift": Shifts(np.zeros(n)),
-        "step": Step(alpha, alpha),
-        "trust": 1.0,
-        "convex": 0.0,
-        "penalty": np.zeros(0),
-        "merit_penalty": np.zeros(0),
-        "row_details": RowDetails.of(sample),
-        "bundle": Bundle.empty(n),
-        "multipliers": np.zeros(0),
-        "steps": np.zeros((0, n)),
-        "changes": np.zeros((0, n)),
-        "uses_bundle": False,
-        "restoring": False,
-        "resets": 0,
-        "concavity": np.zeros(1),
-        "stagnation": 0,
-        "violation_mark": float("inf"),
-        "dropped": False,
-        "twin": -1,
-        "largest_gradient": 0.0,
         "iteration": 0,
         "evaluations": 1,
-        "small": 0,
-        "failed": 0,
         "seconds": 0.0,
         "best_alpha": alpha,
         "best_objective": sample.objective,
-        "best_violation": violation,
-        "best_plain": plain,
+        "best_violation": infinite if failed else scaled_violation(sample),
+        "best_plain": infinite if failed else plain_violation(sample),
+        "dropped": False,
+        "twin": -1,
         "status": RunStatus.RUNNING,
         "reason": "",
         "history": History(),
     }
-    return State(**{**known, **own})

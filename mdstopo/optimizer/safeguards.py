@@ -1,5 +1,4 @@
-"""What keeps sequential approximation safe: a merit, a trust box, shifts and a convex term that adapt, and
-the stops.
+"""What keeps sequential approximation safe: a trust box, shifts, penalties and a convex term that adapt, and the stops.
 
 Published rules where there are any: shifts move as Svanberg's (1987) asymptotes do; the trust box follows the
 ratio of actual to predicted decrease; the convex term grows when the model proves too low, as in conservative
@@ -11,8 +10,9 @@ from math import isfinite
 
 import numpy as np
 
+from mdstopo.optimizer.gsao_state import GsaoState, Step
 from mdstopo.optimizer.problem import Floats, Sample
-from mdstopo.optimizer.state import State, Step
+from mdstopo.optimizer.violations import plain_violation
 from mdstopo.optimizer.wide_numbers import finite, steepest
 from mdstopo.settings.optimizer_presets import Settings
 from mdstopo.status import RunStatus, Status
@@ -45,7 +45,7 @@ GRADIENT_SHARE = 1e-5
 RESIDUAL_SHARE = 0.1
 
 
-def residual_unit(state: State, steepest: float, steepest_row: float = 0.0) -> float:
+def residual_unit(state: GsaoState, steepest: float, steepest_row: float = 0.0) -> float:
     """What the KKT residual is relative to: the largest |dU/dalpha| here, `steepest`, or a share of the largest of any
     iterate: at a smooth minimum inside the bounds the gradient itself vanishes. The largest is kept in the state, also
     that of other rows, `steepest_row`."""
@@ -64,17 +64,7 @@ def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
     return f"{sample.status.value} ({sample.message})" if sample.message else sample.status.value
 
 
-def scaled_violation(sample: Sample) -> float:
-    """The largest constraint violation: c itself, or in the unit of alpha, c over the largest entry of its gradient,
-    whichever is larger."""
-    if not len(sample.constraint_rows):
-        return 0.0
-    slope = steepest(sample.constraint_gradients)
-    unit = np.where(slope > 0.0, np.minimum(slope, 1.0), 1.0)
-    return float(np.max(np.maximum(sample.constraint_rows, 0.0) / unit))
-
-
-def cuts_of(state: State, sample: Sample) -> tuple[Floats, Floats, bool]:
+def cuts_of(state: GsaoState, sample: Sample) -> tuple[Floats, Floats, bool]:
     """The cuts (K,) and their gradients (K, N) after `sample`, that of the state's trial, was rejected; and whether the
     newest tell what stood in the way.
 
@@ -95,7 +85,7 @@ def cuts_of(state: State, sample: Sample) -> tuple[Floats, Floats, bool]:
     return values[-MOST_CUTS:], gradients[-MOST_CUTS:], told
 
 
-def cuts_from(state: State, trial: Floats, objective: float) -> tuple[Floats, Floats]:
+def cuts_from(state: GsaoState, trial: Floats, objective: float) -> tuple[Floats, Floats]:
     """The cuts (K,) that are near enough to matter, and their gradients (K, N), seen from an accepted trial."""
     if not len(state.cuts):
         return state.cuts, state.cut_gradients
@@ -111,23 +101,10 @@ def no_cuts(n: int) -> tuple[Floats, Floats]:
     return np.zeros(0), np.zeros((0, n))
 
 
-def outdated(state: State) -> bool:
+def outdated(state: GsaoState) -> bool:
     """Whether cuts should be dropped before a run ends for want of decrease: seen from far off they may forbid what is
     possible. Not twice at the same place: there they are needed."""
     return len(state.cuts) > 0 and state.objective < state.forgotten - FRESH * abs(state.objective)
-
-
-def merit(objective: float, levels: Floats, penalty: Floats) -> float:
-    """What a step must decrease: the objective, and penalty (J,) times the largest violation of each constraint."""
-    if not len(penalty):
-        return objective
-    return objective + float(np.einsum("i,i->", penalty, np.maximum(levels, 0.0)))
-
-
-def foreseen(state: State) -> float:
-    """What the merit is at the trial if the model is right: where limits hold there, the objective."""
-    penalty = state.penalty if state.uses_bundle else state.merit_penalty
-    return merit(state.objective, state.sample.constraint_levels, penalty) - state.predicted
 
 
 def next_merit_penalty(merit_penalty: Floats, multipliers: Floats, penalty: Floats) -> Floats:
@@ -142,22 +119,6 @@ def first_penalty(sample: Sample, settings: Settings) -> Floats:
     limits = sample.levels_of(steepest(sample.constraint_gradients))
     slope = float(steepest(sample.gradients).max())
     return settings.number("elastic") * (slope if slope > 0.0 else 1.0) / np.where(limits > 0.0, limits, 1.0)
-
-
-def plain_violation(sample: Sample) -> float:
-    """The largest constraint violation c itself, relative to the bound: what a user is told."""
-    if not len(sample.constraint_rows):
-        return 0.0
-    return float(np.maximum(sample.constraint_rows, 0.0).max(initial=0.0))
-
-
-def better(objective: float, violation: float, plain: float, state: State, tolerance: float) -> bool:
-    """Whether a design beats the best so far: feasible before infeasible, among feasible ones by objective, else by the
-    plain violation. The scaled one is large where gradients vanish, as they do where a limit is missed by the least."""
-    feasible = violation <= tolerance
-    if feasible != (state.best_violation <= tolerance):
-        return feasible
-    return objective < state.best_objective if feasible else plain < state.best_plain
 
 
 def next_trust(trust: float, ratio: float, settings: Settings) -> float:
@@ -195,7 +156,7 @@ def next_shift(shift: Floats, last: Step, step: Step, settings: Settings) -> Flo
     return np.clip(shift * factor, settings.number("shift_minimum"), settings.number("shift_maximum"))
 
 
-def verdict(state: State, stuck: bool, settings: Settings) -> tuple[RunStatus, str]:
+def verdict(state: GsaoState, stuck: bool, settings: Settings) -> tuple[RunStatus, str]:
     """Whether to go on, and if not, why: a function of the state alone, so that a resumed run decides alike.
 
     stuck: whether the next step would change next to nothing, or the last ones have.
@@ -223,7 +184,7 @@ def verdict(state: State, stuck: bool, settings: Settings) -> tuple[RunStatus, s
     return RunStatus.RUNNING, ""
 
 
-def recent_change(state: State) -> str:
+def recent_change(state: GsaoState) -> str:
     """How much U has changed over the last iterations, as the end of a sentence; nothing where that is not known."""
     count = min(RECENT, state.iteration)
     taken, objective = state.history.accepted, state.history.objective
@@ -236,7 +197,7 @@ def recent_change(state: State) -> str:
     return f"; the last {count} {'lowered' if change < 0.0 else 'raised'} the objective by {abs(change):.2g} of itself"
 
 
-def is_least(state: State, tolerance: float) -> bool:
+def is_least(state: GsaoState, tolerance: float) -> bool:
     """Whether the largest violation is stationary: its residual is small, also beside the violation itself, which where
     it is tiny could vanish within the residual."""
     rows, slopes = state.constraint_rows, state.constraint_gradients
@@ -244,7 +205,7 @@ def is_least(state: State, tolerance: float) -> bool:
     return bool(state.kkt <= tolerance and left <= RESIDUAL_SHARE * float(rows.max(initial=0.0)))
 
 
-def _without_limits(state: State, settings: Settings) -> tuple[RunStatus, str]:
+def _without_limits(state: GsaoState, settings: Settings) -> tuple[RunStatus, str]:
     """The end of a run at an iterate that breaks limits by an amount that no step makes smaller."""
     excess = f"{plain_violation(state.sample):.3g}"
     if state.best_violation <= settings.tolerance:

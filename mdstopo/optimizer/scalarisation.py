@@ -1,6 +1,7 @@
 """Several objectives as one (Section IV.B): rows whose maximum is U, built from every objective's competing peaks.
 
-Each objective G_i (negated where it is to be maximised) is the maximum of its peaks G_ip; g is Eq. 24 of it. Then
+Each objective G_i (negated where it is to be maximised) is the maximum of its peaks G_ip; g is Eq. 24 of it. Then, by
+the records in `settings.scalarisations`,
 
     weighted_exponential   U = sum_i w_i sign(g_i) |g_i|^p        (Eq. 23)     one row for each choice of peaks p_i
     weighted_sum           U = sum_i w_i g_i                                   the same
@@ -15,14 +16,19 @@ reach every point of a front; 1 keeps U away from zero, to which tolerances are 
 (Messac, Ismail-Yahaya and Mattson 2003).
 """
 
+import importlib
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import product
 from math import prod
+from typing import cast
 
 import numpy as np
 
 from mdstopo.optimizer.problem import Floats
+from mdstopo.settings.scalarisations import SCALARISATIONS
 
 #: rows that one U has at most, choices of peaks that are all taken, and peaks of one objective in a plane of `nc`
 ROWS, CHOICES, PEAKS = 120, 36, 6
@@ -32,16 +38,16 @@ Part = tuple[Floats, Floats]
 
 
 class NotPositiveError(ValueError):
-    """A weighted product of a value that is not positive."""
+    """A value that is not positive where the formula needs it to be."""
 
 
 @dataclass(frozen=True)
 class Scalarisation:
     """One U of m objectives.
 
-    weights (m,): those of weight 0 take no part (method nbi, nc: all take part). lowest, highest (m,): utopia and
-    maxima of Eq. 24, of signed values; None: raw values. exponent: p. anchor, normal (m,): a and r of nbi; anchor and
-    planes (c, m): a and the rows n of nc, whose k is the last objective.
+    method: name of a record. weights (m,): those of weight 0 take no part, unless the formula says that all do. lowest,
+    highest (m,): utopia and maxima of Eq. 24, of signed values; None: raw values. exponent: p. anchor, normal (m,): a
+    and r of nbi; anchor and planes (c, m): a and the rows n of nc, whose k is the last objective.
     """
 
     method: str
@@ -56,7 +62,7 @@ class Scalarisation:
     @property
     def active(self) -> list[int]:
         """The objectives that take part, by place."""
-        if self.method in ("nbi", "nc"):
+        if formula_of(self.method).all_take_part:
             return list(range(len(self.weights)))
         return [i for i, weight in enumerate(self.weights.tolist()) if weight > 0.0]
 
@@ -67,56 +73,29 @@ class Scalarisation:
         width = float(self.highest[i] - self.lowest[i])
         return (values - self.lowest[i]) / width, 1.0 / width
 
+    def transformed_all(self, signed: Floats) -> Floats:
+        """g (K, m) of values (K, m) of all objectives."""
+        if self.lowest is None or self.highest is None:
+            return signed
+        return np.asarray((signed - self.lowest) / (self.highest - self.lowest))
+
     def values(self, signed: Floats) -> Floats:
         """U (K,) of designs with one value (K, m) each; NaN where there is none. Planes of nc are not part of it."""
-        active = self.active
-        raw, weights = signed[:, active], self.weights[active]
-        if self.method == "weighted_product":
-            with np.errstate(invalid="ignore", divide="ignore"):
-                logs = np.log(np.where(raw > 0.0, raw, np.nan))
-            return np.asarray(np.exp(logs @ weights))
-        g = self._transformed_all(signed)[:, active]
-        if self.method == "nbi":
-            return np.asarray((1.0 + (g - self.anchor) / self.normal).max(axis=1))
-        if self.method == "nc":
-            return np.asarray(g[:, -1])
-        if self.method == "weighted_min_max":
-            return np.asarray((weights * g).max(axis=1))
-        p = 1.0 if self.method == "weighted_sum" else self.exponent
-        return np.asarray((weights * np.sign(g) * np.abs(g) ** p).sum(axis=1))
+        return formula_of(self.method).values(self, signed)
 
     def excesses(self, signed: Floats) -> Floats:
         """By how much values (K, m) exceed the planes of nc, (K,) added up; 0 where feasible."""
         if not len(self.planes):
             return np.zeros(len(signed))
-        beyond = (self._transformed_all(signed) - self.anchor) @ self.planes.T
+        beyond = (self.transformed_all(signed) - self.anchor) @ self.planes.T
         return np.asarray(np.maximum(beyond, 0.0).sum(axis=1))
-
-    def _transformed_all(self, signed: Floats) -> Floats:
-        if self.lowest is None or self.highest is None:
-            return signed
-        return np.asarray((signed - self.lowest) / (self.highest - self.lowest))
 
     def rows(self, parts: Sequence[Part]) -> tuple[Floats, Floats]:
         """Rows (R,), highest first, and gradients (R, N), from the active objectives' parts.
 
         Raises NotPositiveError, with the place among the active objectives as its argument.
         """
-        if self.method in ("weighted_min_max", "nbi", "nc"):
-            return _sorted(*self._single(parts))
-        terms = [self._term(i, values, k) for k, (i, (values, _)) in enumerate(zip(self.active, parts, strict=True))]
-        rows, gradients = [], []
-        wanted = all(len(part[1]) for part in parts)
-        for choice in _choices([len(values) for values, _ in terms]):
-            total = sum(float(terms[k][0][p]) for k, p in enumerate(choice))
-            slopes = [float(terms[k][1][p]) for k, p in enumerate(choice)]
-            if self.method == "weighted_product":
-                total = float(np.exp(total))
-                slopes = [total * slope for slope in slopes]
-            rows.append(total)
-            if wanted:
-                gradients.append(sum(slopes[k] * parts[k][1][p] for k, p in enumerate(choice)))
-        return _sorted(np.array(rows), np.array(gradients) if wanted else np.zeros((0, 0)))
+        return _sorted(*formula_of(self.method).rows(self, parts))
 
     def limits(self, parts: Sequence[Part]) -> tuple[Floats, Floats]:
         """Constraint rows (C,) and gradients (C, N), feasible where <= 0; of a fixed number: the last repeated."""
@@ -141,34 +120,168 @@ class Scalarisation:
             slopes += [each[1] for each in found]
         return np.array(values), np.array(slopes).reshape(len(values), parts[0][1].shape[1])
 
-    def _single(self, parts: Sequence[Part]) -> tuple[Floats, Floats]:
-        rows, gradients = [], []
-        for i, (values, slopes) in zip(self.active, parts, strict=True):
-            if self.method == "nc" and i != len(self.weights) - 1:
-                continue
-            g, factor = self.transformed(values, i)
-            scale, shift = float(self.weights[i]), 0.0
-            if self.method == "nbi":
-                scale, shift = 1.0 / float(self.normal[i]), 1.0 - float(self.anchor[i]) / float(self.normal[i])
-            elif self.method == "nc":
-                scale = 1.0
-            rows.append(scale * g + shift)
-            gradients.append(scale * factor * slopes)
-        return np.concatenate(rows), np.concatenate(gradients)
 
-    def _term(self, i: int, values: Floats, k: int) -> tuple[Floats, Floats]:
-        """An objective's share of the sum, and its slope by G, at its peaks."""
-        weight = float(self.weights[i])
-        if self.method == "weighted_product":
-            if np.any(values <= 0.0):
-                raise NotPositiveError(k)
-            return weight * np.log(values), weight / values
-        g, factor = self.transformed(values, i)
-        p = 1.0 if self.method == "weighted_sum" else self.exponent
+class Formula(ABC):
+    """How U follows from the objectives: what a record's `made_by` names. It keeps nothing.
+
+    all_take_part: whether objectives of weight 0 do, too.
+    """
+
+    all_take_part = False
+
+    @abstractmethod
+    def values(self, one: Scalarisation, signed: Floats) -> Floats:
+        """See `Scalarisation.values`."""
+
+    @abstractmethod
+    def rows(self, one: Scalarisation, parts: Sequence[Part]) -> tuple[Floats, Floats]:
+        """See `Scalarisation.rows`; in any order."""
+
+    def spread(self, one: Scalarisation, table: Floats) -> Scalarisation:
+        """Of a way that spreads the points of a front: the one with its `normal` or `planes`, too.
+
+        table (m, m): a row for each end of the front, its objectives scaled by Eq. 24.
+        """
+        raise NotImplementedError
+
+
+class SumOfPowers(Formula):
+    """U = sum_i w_i sign(g_i) |g_i|^p, and whatever else is a sum over objectives: one row for each choice of peaks."""
+
+    def values(self, one: Scalarisation, signed: Floats) -> Floats:
+        """See `Scalarisation.values`."""
+        g, p = one.transformed_all(signed)[:, one.active], self.power(one)
+        return np.asarray((one.weights[one.active] * np.sign(g) * np.abs(g) ** p).sum(axis=1))
+
+    def rows(self, one: Scalarisation, parts: Sequence[Part]) -> tuple[Floats, Floats]:
+        """See `Scalarisation.rows`."""
+        terms = [self.term(one, i, values, k) for k, (i, (values, _)) in enumerate(zip(one.active, parts, strict=True))]
+        rows, gradients = [], []
+        wanted = all(len(part[1]) for part in parts)
+        for choice in _choices([len(values) for values, _ in terms]):
+            total, factor = self.total(sum(float(terms[k][0][p]) for k, p in enumerate(choice)))
+            slopes = [factor * float(terms[k][1][p]) for k, p in enumerate(choice)]
+            rows.append(total)
+            if wanted:
+                gradients.append(sum(slopes[k] * parts[k][1][p] for k, p in enumerate(choice)))
+        return np.array(rows), np.array(gradients) if wanted else np.zeros((0, 0))
+
+    def power(self, one: Scalarisation) -> float:
+        """p."""
+        return one.exponent
+
+    def term(self, one: Scalarisation, i: int, values: Floats, place: int) -> tuple[Floats, Floats]:
+        """An objective's share of the sum, and its slope by G, at its peaks. place: among the active objectives."""
+        weight = float(one.weights[i])
+        g, factor = one.transformed(values, i)
+        p = self.power(one)
         size = np.abs(g)
         with np.errstate(divide="ignore"):
             slope = np.ones_like(g) if p == 1.0 else p * size ** (p - 1.0)
         return weight * np.sign(g) * size**p, weight * slope * factor
+
+    def total(self, added: float) -> tuple[float, float]:
+        """U of a sum, and its slope."""
+        return added, 1.0
+
+
+class Sum(SumOfPowers):
+    """U = sum_i w_i g_i."""
+
+    def power(self, one: Scalarisation) -> float:
+        """p = 1."""
+        return 1.0
+
+
+class Product(SumOfPowers):
+    """U = prod_i G_i^w_i: the exponential of a sum of logarithms, of raw values."""
+
+    def values(self, one: Scalarisation, signed: Floats) -> Floats:
+        """See `Scalarisation.values`."""
+        raw = signed[:, one.active]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            logs = np.log(np.where(raw > 0.0, raw, np.nan))
+        return np.asarray(np.exp(logs @ one.weights[one.active]))
+
+    def term(self, one: Scalarisation, i: int, values: Floats, place: int) -> tuple[Floats, Floats]:
+        """An objective's share of the sum of logarithms, and its slope by G. Raises NotPositiveError."""
+        if np.any(values <= 0.0):
+            raise NotPositiveError(place)
+        weight = float(one.weights[i])
+        return weight * np.log(values), weight / values
+
+    def total(self, added: float) -> tuple[float, float]:
+        """The exponential, which is its own slope."""
+        total = float(np.exp(added))
+        return total, total
+
+
+class Largest(Formula):
+    """U = max_i w_i g_i, and whatever else is the largest of s_i g_i + c_i: one row a peak."""
+
+    def values(self, one: Scalarisation, signed: Floats) -> Floats:
+        """See `Scalarisation.values`."""
+        g = one.transformed_all(signed)[:, one.active]
+        return np.asarray((one.weights[one.active] * g).max(axis=1))
+
+    def rows(self, one: Scalarisation, parts: Sequence[Part]) -> tuple[Floats, Floats]:
+        """See `Scalarisation.rows`."""
+        rows, gradients = [], []
+        for i, (values, slopes) in zip(one.active, parts, strict=True):
+            line = self.line(one, i)
+            if line is not None:
+                scale, shift = line
+                g, factor = one.transformed(values, i)
+                rows.append(scale * g + shift)
+                gradients.append(scale * factor * slopes)
+        return np.concatenate(rows), np.concatenate(gradients)
+
+    def line(self, one: Scalarisation, i: int) -> tuple[float, float] | None:
+        """s and c of objective i; None where it is no part of U."""
+        return float(one.weights[i]), 0.0
+
+
+class BoundaryIntersection(Largest):
+    """U = 1 + max_i (g_i - a_i) / r_i."""
+
+    all_take_part = True
+
+    def values(self, one: Scalarisation, signed: Floats) -> Floats:
+        """See `Scalarisation.values`."""
+        return np.asarray((1.0 + (one.transformed_all(signed) - one.anchor) / one.normal).max(axis=1))
+
+    def line(self, one: Scalarisation, i: int) -> tuple[float, float] | None:
+        """1/r and 1 - a/r."""
+        return 1.0 / float(one.normal[i]), 1.0 - float(one.anchor[i]) / float(one.normal[i])
+
+    def spread(self, one: Scalarisation, table: Floats) -> Scalarisation:
+        """r is 1: all objectives give way alike, in units of Eq. 24."""
+        return replace(one, normal=np.ones(len(table)))
+
+
+class NormalConstraint(Largest):
+    """U = g_k, the last objective; the others are in the planes' rows (`Scalarisation.limits`)."""
+
+    all_take_part = True
+
+    def values(self, one: Scalarisation, signed: Floats) -> Floats:
+        """See `Scalarisation.values`."""
+        return np.asarray(one.transformed_all(signed)[:, -1])
+
+    def line(self, one: Scalarisation, i: int) -> tuple[float, float] | None:
+        """1 and 0 of the last objective."""
+        return (1.0, 0.0) if i == len(one.weights) - 1 else None
+
+    def spread(self, one: Scalarisation, table: Floats) -> Scalarisation:
+        """Planes through the anchor whose normals lead from the other ends to the last one."""
+        return replace(one, planes=table[-1] - table[:-1])
+
+
+@cache
+def formula_of(method: str) -> Formula:
+    """The formula of a way to combine objectives, by its name."""
+    module, _, name = SCALARISATIONS[method].made_by.partition(":")
+    return cast(Formula, getattr(importlib.import_module(module), name)())
 
 
 def _choices(counts: Sequence[int]) -> list[tuple[int, ...]]:

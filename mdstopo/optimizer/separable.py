@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mdstopo.optimizer.approximation import Approximation
 from mdstopo.optimizer.competing_rows import FeasibleSet
+from mdstopo.optimizer.gsao_state import GsaoState, Step
 from mdstopo.optimizer.interior import Optimum
 from mdstopo.optimizer.problem import Floats, Sample
 from mdstopo.optimizer.safeguards import (
@@ -20,7 +21,6 @@ from mdstopo.optimizer.safeguards import (
     cuts_from,
     cuts_of,
     first_penalty,
-    merit,
     next_convex,
     next_merit_penalty,
     next_shift,
@@ -28,11 +28,10 @@ from mdstopo.optimizer.safeguards import (
     no_cuts,
     outdated,
     residual_unit,
-    scaled_violation,
 )
 from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.subproblem import solve
+from mdstopo.optimizer.violations import merit, scaled_violation
 from mdstopo.optimizer.wide import Measures, ShiftRule, is_wide, next_wide_shift, propose
 from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.settings.optimizer_presets import Settings
@@ -68,13 +67,13 @@ class SeparableMethod:
         self._rule = ShiftRule.of(settings)
         self._trusted = settings.flag("trust_region")
 
-    def begin(self, state: State) -> None:
+    def begin(self, state: GsaoState) -> None:
         """Start at the iterate of a new state, whose shifts, trust box and convex term are those of the settings."""
         state.penalty = state.merit_penalty = first_penalty(state.sample, self.settings)
 
     # -- the steps
 
-    def judge(self, state: State, sample: Sample) -> bool:
+    def judge(self, state: GsaoState, sample: Sample) -> bool:
         """Whether the evaluated trial is accepted, and then the iterate.
 
         Adapts the trust box, the convex term, shifts and cuts, and the count of steps without decrease.
@@ -105,7 +104,7 @@ class SeparableMethod:
             state.forgotten, state.small = state.objective, 0
         return accepted
 
-    def propose(self, state: State) -> None:
+    def propose(self, state: GsaoState) -> None:
         """Approximate at the iterate, solve, and set the next trial, what it promises, and the KKT residual."""
         chosen = self._competing(state)
         if is_wide(state, self.space.linear, self.settings) and self._propose_wide(state, chosen):
@@ -130,13 +129,13 @@ class SeparableMethod:
             raised = np.minimum(PENALTY_GROWTH * state.penalty, np.maximum(ceiling, state.penalty))
             state.penalty = np.where(reached, raised, state.penalty)
 
-    def is_exhausted(self, state: State) -> bool:
+    def is_exhausted(self, state: GsaoState) -> bool:
         """Whether the last steps have changed next to nothing."""
         return state.small >= PATIENCE and state.violation <= self.settings.tolerance
 
     # -- how
 
-    def _follow(self, state: State) -> None:
+    def _follow(self, state: GsaoState) -> None:
         """The shifts after the step from the iterate to the trial."""
         last, state.step = state.step, Step(state.trial, state.alpha)
         if len(state.alpha) >= WIDE:
@@ -144,7 +143,7 @@ class SeparableMethod:
         else:
             state.shift = Shifts(next_shift(state.shift.array(), last, state.step, self.settings))
 
-    def _propose_wide(self, state: State, chosen: Indices) -> bool:
+    def _propose_wide(self, state: GsaoState, chosen: Indices) -> bool:
         """Propose as of many variables, if the highest row decides; whether it did."""
         found = propose(state, chosen, self._measures, self.settings)
         if found is None:
@@ -157,7 +156,7 @@ class SeparableMethod:
         state.predicted = before - found.promised
         return True
 
-    def _solve(self, state: State, chosen: Indices) -> tuple[Approximation, Optimum]:
+    def _solve(self, state: GsaoState, chosen: Indices) -> tuple[Approximation, Optimum]:
         """The model whose competing rows are `chosen`, and its solution; more convex where it resists."""
         linear = self.space.linear
         model = self._approximate(state, chosen)
@@ -172,7 +171,7 @@ class SeparableMethod:
             optimum = solve(model, lower, upper, linear, penalty)
         return model, optimum
 
-    def _competing(self, state: State) -> Indices:
+    def _competing(self, state: GsaoState) -> Indices:
         """The rows that compete for the objective, by their places."""
         settings = self.settings
         if len(state.rows) == 1:
@@ -183,7 +182,7 @@ class SeparableMethod:
         near = state.rows >= highest - settings.number("peak_window") * abs(highest)
         return np.flatnonzero(near)[: int(settings.number("peaks"))]
 
-    def _approximate(self, state: State, chosen: Indices) -> Approximation:
+    def _approximate(self, state: GsaoState, chosen: Indices) -> Approximation:
         settings = self.settings
         n = len(state.alpha)
         slopes = np.concatenate(
@@ -207,7 +206,7 @@ class SeparableMethod:
             state.convex * steepest / self.space.range,
         )
 
-    def _box(self, state: State, model: Approximation) -> tuple[Floats, Floats]:
+    def _box(self, state: GsaoState, model: Approximation) -> tuple[Floats, Floats]:
         """Bounds, move limit, trust box, and the margin that keeps x strictly between its shifts."""
         settings = self.settings
         reach = np.minimum(settings.number("move_limit"), state.trust * self.space.range)
@@ -222,7 +221,7 @@ class SeparableMethod:
                 above = np.minimum(above, share * model.above)
         return np.maximum(self.space.lower, state.alpha - below), np.minimum(self.space.upper, state.alpha + above)
 
-    def _kkt(self, state: State, model: Approximation, optimum: Optimum) -> float:
+    def _kkt(self, state: GsaoState, model: Approximation, optimum: Optimum) -> float:
         """The projected KKT residual at the iterate with the subproblem's multipliers, relative to max
         |dU/dalpha|.
 

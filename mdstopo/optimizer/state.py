@@ -1,21 +1,22 @@
-"""The whole state of an optimisation between two iterations: arrays and numbers, nothing else.
+"""What every optimiser knows between two iterations: its design, how good that is, how it stands, and the history.
 
-`State.to_arrays` and `State.from_arrays` are inverse to the bit, so that a resumed run is exact by
-construction: there is no other place in which the optimiser remembers anything.
+What an optimiser remembers beside this is its own: further fields of a class of its own, derived from `State`. Nobody
+else reads them. `State.to_arrays` and `State.from_arrays` are inverse to the bit for all fields, so that a resumed run
+is exact by construction: there is no other place in which an optimiser remembers anything.
 """
 
+import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from operator import attrgetter
-from typing import Any
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.problem import Floats, Ints, Sample
-from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.stack import Slopes, Stack, slopes_of
+from mdstopo.settings.optimizer_presets import DEFAULT_OPTIMIZER
+from mdstopo.settings.optimizers import OPTIMIZERS
 from mdstopo.status import RunStatus, Status
 
 Array = NDArray[Any]
@@ -117,108 +118,35 @@ def _reported(sample: Sample, name: str, before: list[Floats] | None) -> Floats:
 _COLUMN_TYPES: dict[str, type] = {"evaluations": np.int64, "accepted": np.bool_}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
-    """A step by the designs (N,) that it led to and came from: of very many variables the difference is not formed and
-    kept only because its sign will be asked for."""
-
-    to: Floats
-    origin: Floats
-
-    def __eq__(self, other: object) -> bool:
-        """Whether two steps lie between the same arrays."""
-        return isinstance(other, Step) and self.to is other.to and self.origin is other.origin
-
-    __hash__ = None  # type: ignore[assignment]  # arrays have none
-
-    def array(self) -> Floats:
-        """The difference, (N,)."""
-        return self.to - self.origin
-
-
-@dataclass(frozen=True, slots=True)
-class RowDetails:
-    """What a sample says of its rows beside values and gradients; see `problem.Sample`."""
-
-    constraint_groups: Ints
-    offset: Floats
-    across: Floats
-    constraint_offset: Floats
-    constraint_across: Floats
-
-    @classmethod
-    def of(cls, sample: Sample) -> "RowDetails":
-        """The details of a sample's rows."""
-        return cls(*(getattr(sample, f.name) for f in fields(cls)))
-
-
 @dataclass(slots=True)
 class State:
-    """What the optimiser knows after an iteration.
+    """What is known after an iteration, whichever optimiser made it.
 
-    The iterate and what was found there: `alpha` (N,), `objective`, `rows` (R,), `gradients` (R, N),
-    `constraint_rows` (C,), `constraint_gradients` (C, N), `violation` (`safeguards.scaled_violation`), and
-    `row_details`, which rows are norms and which constraint each belongs to. What rejected trials have
-    shown: `cuts` (K,), rows that were the highest there, linearised and seen from the iterate, and `cut_gradients`
-    (K, N); `forgotten`, the objective at which they were last dropped.
-    The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
-    the model promises, and `kkt`, the residual at `alpha`. The adaptation: `shift` (N,) distances of the
-    shifts, `step` the last accepted step, in files its difference (N,), `trust` the half width of the trust box in
-    ranges, `uses_bundle` which method makes the steps: `bundle` with the `multipliers` (K,) of its rows, `steps` and
-    `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation stands for the
-    objective, `resets` how often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups
-    (`Bundle.lowered`), `stagnation` how many iterates the largest violation has not fallen well below `violation_mark`,
-    `dropped` whether others of several starts go on instead, `twin` the number of the one that came to the same (-1:
-    none), `largest_gradient` the largest |dU/dalpha| of any iterate;
-    or else `convex` the relative weight of the quadratic term. Of each constraint: `penalty` (J,) on violations in the
-    subproblem, `merit_penalty` (J,) on them in the separable approximation's merit. Counters: `iteration`,
-    `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`.
-    The best so far: `best_alpha` (N,), `best_objective`, `best_violation`, and `best_plain`, its violation
-    relative to the bounds alone. How it stands: `status`, and `reason` for it in words. `history`: a row an evaluation.
+    The iterate `alpha` (N,), its `objective`, and its `kkt` residual, NaN where that is not known; `trial` (N,), the
+    design that is evaluated next. The best design so far: `best_alpha` (N,), `best_objective`, and by how much it
+    misses limits, `best_violation` (`violations.scaled_violation`) and `best_plain` (`violations.plain_violation`).
+    Counters: `iteration`, `evaluations`, `seconds`. Of several starts: `dropped`, whether others go on instead, and
+    `twin`, the number of the one that came to the same (-1: none). How it stands: `status`, and `reason` for it in
+    words. `history`: a row an evaluation.
+
+    A derived class says in `optimizer` the name of the record (`settings.optimizers`) whose states it has.
     """
+
+    optimizer: ClassVar[str] = ""
 
     alpha: Floats
     objective: float
-    rows: Floats
-    gradients: Floats
-    constraint_rows: Floats
-    constraint_gradients: Floats
-    violation: float
-    cuts: Floats
-    cut_gradients: Floats
-    forgotten: float
     trial: Floats
-    predicted: float
     kkt: float
-    shift: Shifts
-    step: Step
-    trust: float
-    convex: float
-    penalty: Floats
-    merit_penalty: Floats
-    row_details: RowDetails
-    bundle: Bundle
-    multipliers: Floats
-    steps: Slopes
-    changes: Slopes
-    uses_bundle: bool
-    restoring: bool
-    resets: int
-    concavity: Floats
-    stagnation: int
-    violation_mark: float
-    dropped: bool
-    twin: int
-    largest_gradient: float
     iteration: int
     evaluations: int
-    small: int
-    failed: int
     seconds: float
     best_alpha: Floats
     best_objective: float
     best_violation: float
     best_plain: float
+    dropped: bool
+    twin: int
     status: RunStatus
     reason: str
     history: History
@@ -228,84 +156,90 @@ class State:
         """Whether another iteration is due."""
         return self.status is RunStatus.RUNNING
 
+    # What an optimiser may tell of its own part; the defaults tell nothing.
+
     @property
-    def sample(self) -> Sample:
-        """The iterate's function values as a sample."""
-        return Sample(
-            self.objective,
-            self.rows,
-            self.gradients,
-            self.constraint_rows,
-            self.constraint_gradients,
-            self.row_details.constraint_groups,
-            self.row_details.offset,
-            self.row_details.across,
-            self.row_details.constraint_offset,
-            self.row_details.constraint_across,
-        )
+    def is_restoring(self) -> bool:
+        """Whether a design that keeps the limits is looked for before the objective is lowered any further."""
+        return False
 
-    def take(self, sample: Sample, violation: float) -> None:
-        """Make the trial the iterate; sample and violation (`safeguards.scaled_violation`) are what was found there."""
-        self.alpha = self.trial
-        self.objective, self.violation = sample.objective, violation
-        self.rows, self.gradients = sample.rows, sample.gradients
-        self.constraint_rows, self.constraint_gradients = sample.constraint_rows, sample.constraint_gradients
-        self.row_details = RowDetails.of(sample)
+    def foreseen(self) -> float:
+        """The objective that is expected at the trial; NaN where it is not known."""
+        return float("nan")
 
-    def copy(self) -> "State":
+    def slope(self) -> Floats:
+        """dU/dalpha (N,) of the highest row at the iterate; zeros where it is not known."""
+        return np.zeros(len(self.alpha))
+
+    def row_shares(self) -> tuple[Ints, Floats]:
+        """Which rows hold the iterate: of each (K,) its group, 0 of the objective and j of the j-th constraint, and its
+        share of the Lagrangian's gradient, in any unit. No rows where that is not known."""
+        return np.zeros(0, dtype=np.int64), np.zeros(0)
+
+    # Copies and files.
+
+    def copy(self) -> Self:
         """Another state with the same values; `dataclasses.replace` takes several times as long."""
-        return State(*_values(self))
+        return type(self)(*_getter(type(self))(self))
 
     def to_arrays(self) -> dict[str, Array]:
         """The state as arrays by name (numbers as 0-d arrays, text as UTF-8 bytes, `history/<column>`)."""
-        out: dict[str, Array] = {}
+        out: dict[str, Array] = {"optimizer": _bytes(self.optimizer)}
         for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(value, History):
-                out |= {f"history/{name}": column for name, column in value.to_arrays().items()}
-            elif isinstance(value, (Bundle, RowDetails)):
-                parts = {part.name: getattr(value, part.name) for part in fields(value)}
-                out |= {f"{f.name}/{name}": np.array(x) if isinstance(x, Stack) else x for name, x in parts.items()}
-            elif isinstance(value, (Step, Shifts)):
-                out[f.name] = value.array().copy()
-            elif isinstance(value, str):
-                out[f.name] = np.frombuffer(value.encode(), dtype=np.uint8).copy()
-            else:
-                out[f.name] = np.array(value)
+            out |= self._to_arrays(f.name, getattr(self, f.name))
         return out
 
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Array]) -> "State":
+        """The inverse of `to_arrays`, of the class that wrote them.
+
+        Raises KeyError naming the first array that is missing, or the optimiser that is not known.
+        """
+        # older files do not name theirs
+        name = _text(arrays["optimizer"]) if "optimizer" in arrays else DEFAULT_OPTIMIZER
+        kind = class_of_states(name)
+        return kind(**{f.name: kind._from_arrays(f.name, arrays) for f in fields(kind)})
+
+    def _to_arrays(self, name: str, value: Any) -> dict[str, Array]:
+        """One field as arrays; a derived class converts here what is neither number, text nor array."""
+        if isinstance(value, History):
+            return {f"{name}/{column}": array for column, array in value.to_arrays().items()}
+        return {name: _bytes(value) if isinstance(value, str) else np.array(value)}
+
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, Array]) -> "State":
-        """The inverse of `to_arrays`. Raises KeyError naming the first array that is missing."""
-        values: dict[str, object] = {}
-        history: dict[str, Array] = {}
-        for name, array in arrays.items():
-            if name.startswith("history/"):
-                history[name.removeprefix("history/")] = np.asarray(array)
-        for f in fields(cls):
-            if f.name == "history":
-                values[f.name] = History.from_arrays(history)
-                continue
-            if f.name in _PARTS:
-                kind = _PARTS[f.name]
-                values[f.name] = kind(*(np.array(arrays[f"{f.name}/{part.name}"]) for part in fields(kind)))
-                continue
-            array = np.asarray(arrays[f.name])
-            if f.name in ("steps", "changes"):
-                values[f.name] = slopes_of(np.array(array))
-            elif f.name in ("status", "reason"):
-                text = array.tobytes().decode()
-                values[f.name] = RunStatus(text) if f.name == "status" else text
-            elif f.name == "shift":
-                values[f.name] = Shifts(np.array(array))
-            elif f.name == "step":
-                values[f.name] = Step(np.array(array), np.zeros(array.shape))
-            else:
-                values[f.name] = array.item() if array.ndim == 0 else np.array(array)
-        return cls(**values)  # type: ignore[arg-type]
+    def _from_arrays(cls, name: str, arrays: Mapping[str, Array]) -> Any:
+        """The inverse of `_to_arrays`."""
+        if name == "history":
+            head = f"{name}/"
+            names = [key for key in arrays if key.startswith(head)]
+            return History.from_arrays({key.removeprefix(head): np.asarray(arrays[key]) for key in names})
+        array = np.asarray(arrays[name])
+        if name == "status":
+            return RunStatus(_text(array))
+        if name == "reason":
+            return _text(array)
+        return array.item() if array.ndim == 0 else np.array(array)
 
 
-#: fields that are arrays by name themselves
-_PARTS: dict[str, type[Bundle] | type[RowDetails]] = {"bundle": Bundle, "row_details": RowDetails}
+def class_of_states(optimizer: str) -> type[State]:
+    """The class of an optimiser's states. Raises KeyError where there is none of that name."""
+    module, _, name = OPTIMIZERS[optimizer].states.partition(":")
+    return cast(type[State], getattr(importlib.import_module(module), name))
 
-_values = attrgetter(*(f.name for f in fields(State)))
+
+_getters: dict[type[State], Any] = {}
+
+
+def _getter(kind: type[State]) -> Any:
+    """What takes the values of all fields of a class of states."""
+    if kind not in _getters:
+        _getters[kind] = attrgetter(*(f.name for f in fields(kind)))
+    return _getters[kind]
+
+
+def _bytes(text: str) -> Array:
+    return np.frombuffer(text.encode(), dtype=np.uint8).copy()
+
+
+def _text(array: Array) -> str:
+    return np.asarray(array).tobytes().decode()

@@ -21,10 +21,10 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.optimizer.gsao_state import GsaoState, Step
 from mdstopo.optimizer.nearest_feasible import ROUNDING, repair
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
 from mdstopo.optimizer.wide_numbers import LIGHT, WIDE, steepest, stride, threads_for, total
 from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_look, wide_shift, wide_shift_few
@@ -154,7 +154,7 @@ class Measures:
             self.excess.tell(total - self.space.linear.b, x)
 
 
-def is_wide(state: State, linear: LinearRows, settings: Settings) -> bool:
+def is_wide(state: GsaoState, linear: LinearRows, settings: Settings) -> bool:
     """Whether `propose` may make the next step of a state."""
     return (
         len(state.alpha) >= MANY
@@ -166,7 +166,7 @@ def is_wide(state: State, linear: LinearRows, settings: Settings) -> bool:
     )
 
 
-def propose(state: State, chosen: Indices, measures: Measures, settings: Settings) -> Proposal | None:
+def propose(state: GsaoState, chosen: Indices, measures: Measures, settings: Settings) -> Proposal | None:
     """The next step from a state, whose competing rows are `chosen`.
 
     Nothing where more than the highest row decides, or where the subproblem resists.
@@ -204,7 +204,7 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
     return Proposal(trial, float(state.rows[row]) + change, max(residual, slack))
 
 
-def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper: Floats, power: float) -> bool:
+def _decides(state: GsaoState, chosen: Indices, trial: Floats, lower: Floats, upper: Floats, power: float) -> bool:
     """Whether one row decides the step: no other row is higher than it at the trial, and no limit is violated there.
 
     state: the iterate with its rows, cuts and constraint rows.

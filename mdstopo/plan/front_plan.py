@@ -20,12 +20,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.optimizer.scalarisation import Scalarisation, formula_of
 from mdstopo.optimizer.start_families import Family, begins_at_best, family_of
 from mdstopo.plan.front_measures import dominated
 from mdstopo.plan.race import Solved, race, rivals
 from mdstopo.plan.solve_task import Found, Result, Task
 from mdstopo.plan.visited import Place, Visited, belonging, even_spacing
+from mdstopo.settings.scalarisations import SCALARISATIONS, SUM
 from mdstopo.status import RunStatus
 
 Floats = NDArray[np.float64]
@@ -44,8 +45,6 @@ VISITED_GAIN = 1e-4
 REFINEMENTS, MOVED, MOVED_AGAIN = 4, 1e-6, 1e-3
 #: violation of a constraint, relative to its bound, up to which a design counts as feasible here
 TOLERATED = 1e-6
-#: methods that spread points evenly
-SPREADING = ("nbi", "nc")
 
 
 @dataclass(frozen=True)
@@ -368,7 +367,7 @@ class Planner:
     # scalarisations
 
     def _alone(self, i: int) -> Scalarisation:
-        return Scalarisation("weighted_sum", np.eye(self.m)[i])
+        return Scalarisation(SUM, np.eye(self.m)[i])
 
     def _vertex(self, j: int) -> int:
         """The objective that point j asks for alone, or -1."""
@@ -381,16 +380,14 @@ class Planner:
         i = self._vertex(j)
         if i >= 0:
             return self._alone(i)
-        if request.method in SPREADING:
+        kind = SCALARISATIONS[request.method]
+        if not kind.in_cases:  # it spreads the points evenly
             # in units of Eq. 24 the ends are the rows of a table; anchors lie on the plane through them
             table = np.array([(self._signed(end) - self.lowest) / (self.highest - self.lowest) for end in self.ends])
             anchor = direction @ table
-            if request.method == "nbi":
-                normal = np.ones(self.m)
-                return Scalarisation("nbi", np.ones(self.m), self.lowest, self.highest, anchor=anchor, normal=normal)
-            planes = table[-1] - table[:-1]
-            return Scalarisation("nc", np.ones(self.m), self.lowest, self.highest, anchor=anchor, planes=planes)
-        if not request.normalize or request.method == "weighted_product":
+            one = Scalarisation(kind.name, np.ones(self.m), self.lowest, self.highest, anchor=anchor)
+            return formula_of(kind.name).spread(one, table)
+        if not (request.normalize and kind.scaled):
             return Scalarisation(request.method, direction, exponent=request.exponent)
         return Scalarisation(request.method, direction, self.lowest, self.highest, request.exponent)
 

@@ -10,8 +10,9 @@ from mdstopo.case.uncertain import Measure
 from mdstopo.design_problem import sign_of
 from mdstopo.evaluation import Evaluation, FloatArray
 from mdstopo.robust.ensemble import NOMINAL, Ensemble
-from mdstopo.robust.intervals import Estimate, estimate
+from mdstopo.robust.intervals import Estimate
 from mdstopo.robust.points_in_workers import PointWorkers
+from mdstopo.robust.robust_measures import estimate
 from mdstopo.robust.sample import Sample, check_sample
 from mdstopo.robust.trial import Trial, tried
 from mdstopo.store.contents import Datasets
@@ -138,10 +139,10 @@ def _robust(
     sample: the design's.
     """
     sign = sign_of(of) if isinstance(of, Objective) else (-1.0 if of.sense == "at_least" else 1.0)
-    if fresh is None or measure.name == "nominal":
+    if fresh is None or not measure.is_sampled:
         return Robust(name, measure.words, nominal, value, None, None, None, sign)
-    level = replace(measure, level=_level_of_worst(sign * values, sample)) if measure.name == "worst" else measure
-    found = estimate(level, sign * fresh)
+    level = measure.level if "level" in measure.kind.keys else _level_of_worst(sign * values, sample)
+    found = estimate(replace(measure, level=level), sign * fresh)
     low, high = (found.low, found.high) if sign > 0.0 else (-found.high, -found.low)
     kept = None
     if isinstance(of, ResponseRow) and of.sense != "equals":

@@ -61,8 +61,8 @@ class Ensemble(Evaluator):
         self._bounds_here = [row.bound for row in case.constraints]
         measures = [self.uncertainty.objectives[name] for name in self._names]
         measures += [self.uncertainty.constraints[i] for i in self._limits]
-        self._nominal_too = any(measure.name == "nominal" for measure in measures)
-        self._wanted = range(len(self.sample)) if any(m.name != "nominal" for m in measures) else range(0)
+        self._nominal_too = any(not measure.is_sampled for measure in measures)
+        self._wanted = range(len(self.sample)) if any(measure.is_sampled for measure in measures) else range(0)
         if points is None:
             points = {i: evaluator_at(case, self.sample, i) for i in range(len(self.sample))}
             points[NOMINAL] = nominal_evaluator(case, beside=False)
@@ -114,7 +114,7 @@ class Ensemble(Evaluator):
         self, name: str, values: Sequence[float], errors: Sequence[ErrorEstimate], nominal: ErrorEstimate
     ) -> ErrorEstimate:
         measure = self.uncertainty.objectives[name]
-        if measure.name == "nominal":
+        if not measure.is_sampled:
             return nominal
         sign = next(sign_of(each) for each in self.case.objectives if each.name == name)
         weights = np.abs(slopes(measure, sign * np.array(values), self.sample.probability))
@@ -242,7 +242,7 @@ class Ensemble(Evaluator):
     ) -> tuple[Peak, ...]:
         # what bounds a value from the good side is no row: the value itself stands for it
         own = {i: peaks if competes(of, sign) else peaks[:1] for i, peaks in found.items()}
-        if measure.name == "nominal":
+        if not measure.is_sampled:
             return own[NOMINAL]
         return rows(measure, [own[i] for i in self._wanted], self.sample.probability, sign)
 

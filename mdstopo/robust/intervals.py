@@ -15,9 +15,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from mdstopo.case.uncertain import Measure
 from mdstopo.evaluation import FloatArray
-from mdstopo.robust.robust_measures import statistic
 
 CONFIDENCE = 0.95
 #: by how much, relatively, sums of the same numbers may differ
@@ -41,24 +39,6 @@ class Estimate:
         return self.low - slack <= value <= self.high + slack
 
 
-def estimate(measure: Measure, y: FloatArray) -> Estimate:
-    """Of equally likely independent values y (n,), worse where larger; `worst` as a quantile of its level."""
-    n = len(y)
-    if measure.name in ("worst", "quantile"):
-        value = statistic(Measure("quantile", level=measure.level), y, np.full(n, 1.0 / n))
-        return Estimate(value, *_order_statistics(np.sort(y), measure.level))
-    mean = float(y.mean())
-    influences = y - mean
-    value = mean
-    if measure.name == "mean_deviation":
-        deviation = float(y.std(ddof=1))
-        value += measure.factor * deviation
-        if deviation > 0.0:
-            influences = influences + measure.factor * ((y - mean) ** 2 - deviation**2) / (2.0 * deviation)
-    half = student(n - 1) * float(influences.std(ddof=1)) / math.sqrt(n)
-    return Estimate(value, value - half, value + half)
-
-
 def student(degrees: int, confidence: float = CONFIDENCE) -> float:
     """How many deviations to each side hold the share `confidence` of Student's distribution, from its expansion in
     1/degrees (Abramowitz and Stegun 26.7.5); off by 2e-4 at 29 degrees of freedom, less at more."""
@@ -68,7 +48,7 @@ def student(degrees: int, confidence: float = CONFIDENCE) -> float:
     return z + first / degrees + second / degrees**2
 
 
-def _order_statistics(rising: FloatArray, level: float) -> tuple[float, float]:
+def order_statistics(rising: FloatArray, level: float) -> tuple[float, float]:
     """The values between which the quantile is, from n rising values."""
     n = len(rising)
     tail = 0.5 * (1.0 - CONFIDENCE)

@@ -21,13 +21,20 @@ and quantile also where points do. What competes becomes rows, whose maximum the
   rises; rows that exceed it for that reason are left out.
 """
 
+import importlib
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import cache
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.measures import MEASURES
 from mdstopo.case.uncertain import Measure
 from mdstopo.evaluation import FloatArray, Peak
+from mdstopo.robust.intervals import Estimate, order_statistics, student
 
 #: rows of one measure, at most; of those of a mean, at most
 ROWS, MEANS = 16, 8
@@ -37,29 +44,138 @@ WINDOW = 0.15
 _ROUNDING, _NONE = 1e-9, 1e-14
 
 
+class Statistic(ABC):
+    """How a measure follows from values: what a record's `made_by` names. It keeps nothing.
+
+    In all functions, y (S,) are values, worse where larger, with probabilities p (S,) of sum 1.
+    """
+
+    @abstractmethod
+    def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
+        """The measure."""
+
+    @abstractmethod
+    def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
+        """d measure / d y, (S,)."""
+
+    @abstractmethod
+    def rows(self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
+        """See `rows`."""
+
+    @abstractmethod
+    def estimate(self, measure: Measure, y: FloatArray) -> Estimate:
+        """Of equally likely independent values y (n,): the measure with its interval of confidence."""
+
+
+class Mean(Statistic):
+    """m = sum p y."""
+
+    def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
+        """See `Statistic.value`."""
+        return float((p * y).sum())
+
+    def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
+        """See `Statistic.slopes`."""
+        return p.copy()
+
+    def rows(self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
+        """The measure with other choices of one peak a point, none above the one with the highest everywhere."""
+        made = [_row(measure, parts, choice, p, sign) for choice in _choices(parts, p, sign)]
+        least = sign * made[0].value - WINDOW * abs(made[0].value)
+        most = sign * made[0].value
+        others = [row for row in made[1:] if least <= sign * row.value <= most]
+        return (made[0], *sorted(others, key=lambda row: -sign * row.value))
+
+    def estimate(self, measure: Measure, y: FloatArray) -> Estimate:
+        """By Student's distribution of the influences."""
+        value, influences = self.influences(measure, y, float(y.mean()))
+        half = student(len(y) - 1) * float(influences.std(ddof=1)) / math.sqrt(len(y))
+        return Estimate(value, value - half, value + half)
+
+    def influences(self, measure: Measure, y: FloatArray, mean: float) -> tuple[float, FloatArray]:
+        """The estimate of the measure, and what each value (n,) has it differ by, times n."""
+        return mean, y - mean
+
+
+class MeanAndDeviation(Mean):
+    """m + k s, s^2 = sum p (y - m)^2."""
+
+    def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
+        """See `Statistic.value`."""
+        mean = super().value(measure, y, p)
+        return mean + measure.factor * _deviation(y, p, mean)
+
+    def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
+        """See `Statistic.slopes`; those of the mean where all values are the same."""
+        mean = super().value(measure, y, p)
+        deviation = _deviation(y, p, mean)
+        if deviation > 0.0:
+            return np.asarray(p * (1.0 + measure.factor * (y - mean) / deviation))
+        return super().slopes(measure, y, p)
+
+    def influences(self, measure: Measure, y: FloatArray, mean: float) -> tuple[float, FloatArray]:
+        """See `Mean.influences`."""
+        deviation = float(y.std(ddof=1))
+        value, influences = mean + measure.factor * deviation, y - mean
+        if deviation > 0.0:
+            influences = influences + measure.factor * ((y - mean) ** 2 - deviation**2) / (2.0 * deviation)
+        return value, influences
+
+
+class Quantile(Statistic):
+    """The smallest y at or below which at least the share `level` of p lies."""
+
+    def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
+        """See `Statistic.value`."""
+        return float(y[self.ranked(measure, y, p)[-1]])
+
+    def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
+        """See `Statistic.slopes`: 1 of the point whose value it is."""
+        found = np.zeros(len(y))
+        found[self.ranked(measure, y, p)[-1]] = 1.0
+        return found
+
+    def rows(self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
+        """The peaks of the points that do not exceed it."""
+        y = sign * np.array([part[0].value for part in parts])
+        found = [peak for s in np.sort(self.ranked(measure, y, p)).tolist() for peak in parts[s]]
+        found.sort(key=lambda peak: -sign * peak.value)
+        least = sign * found[0].value - WINDOW * abs(found[0].value)
+        return tuple(peak for peak in found[:ROWS] if sign * peak.value >= least)
+
+    def estimate(self, measure: Measure, y: FloatArray) -> Estimate:
+        """By two order statistics."""
+        value = float(y[_ranked(measure.level, y, np.full(len(y), 1.0 / len(y)))[-1]])
+        return Estimate(value, *order_statistics(np.sort(y), measure.level))
+
+    def ranked(self, measure: Measure, y: FloatArray, p: FloatArray) -> NDArray[np.intp]:
+        """The points that do not exceed it; the last one has its value."""
+        return _ranked(measure.level, y, p)
+
+
+class Worst(Quantile):
+    """max y. The worst of a sample is estimated as a quantile of the measure's level."""
+
+    def ranked(self, measure: Measure, y: FloatArray, p: FloatArray) -> NDArray[np.intp]:
+        """All points, the first of the worst last."""
+        return np.roll(np.arange(len(y)), -1 - int(np.argmax(y)))
+
+
+@cache
+def _statistic_of(name: str) -> Statistic:
+    """How a measure follows, by its name."""
+    module, _, made = MEASURES[name].made_by.partition(":")
+    return cast(Statistic, getattr(importlib.import_module(module), made)())
+
+
 def statistic(measure: Measure, y: FloatArray, p: FloatArray) -> float:
     """The measure of values y (S,), worse where larger."""
-    if measure.name == "worst":
-        return float(y.max())
-    if measure.name == "quantile":
-        return float(y[_ranked(measure.level, y, p)[-1]])
-    mean = float((p * y).sum())
-    return mean + measure.factor * _deviation(y, p, mean) if measure.name == "mean_deviation" else mean
+    return _statistic_of(measure.name).value(measure, y, p)
 
 
 def slopes(measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
     """d measure / d y, (S,)."""
-    if measure.name in ("worst", "quantile"):
-        level = 1.0 if measure.name == "worst" else measure.level
-        found = np.zeros(len(y))
-        found[_ranked(level, y, p)[-1] if level < 1.0 else int(np.argmax(y))] = 1.0
-        return found
-    if measure.name == "mean_deviation":
-        mean = float((p * y).sum())
-        deviation = _deviation(y, p, mean)
-        if deviation > 0.0:
-            return np.asarray(p * (1.0 + measure.factor * (y - mean) / deviation))
-    return p.copy()
+    return _statistic_of(measure.name).slopes(measure, y, p)
 
 
 def rows(measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
@@ -68,19 +184,12 @@ def rows(measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign:
     parts: at each point what competes there, worst first. sign: 1 where larger values are worse, else -1. A row's time
     is NaN where it is of several points.
     """
-    y = sign * np.array([part[0].value for part in parts])
-    if measure.name in ("worst", "quantile"):
-        level = 1.0 if measure.name == "worst" else measure.level
-        lowest = np.sort(_ranked(level, y, p)) if level < 1.0 else np.arange(len(y))
-        found = [peak for s in lowest.tolist() for peak in parts[s]]
-        found.sort(key=lambda peak: -sign * peak.value)
-        least = sign * found[0].value - WINDOW * abs(found[0].value)
-        return tuple(peak for peak in found[:ROWS] if sign * peak.value >= least)
-    made = [_row(measure, parts, choice, p, sign) for choice in _choices(parts, p, sign)]
-    least = sign * made[0].value - WINDOW * abs(made[0].value)
-    most = sign * made[0].value
-    others = [row for row in made[1:] if least <= sign * row.value <= most]
-    return (made[0], *sorted(others, key=lambda row: -sign * row.value))
+    return _statistic_of(measure.name).rows(measure, parts, p, sign)
+
+
+def estimate(measure: Measure, y: FloatArray) -> Estimate:
+    """Of equally likely independent values y (n,), worse where larger; the worst as a quantile of its level."""
+    return _statistic_of(measure.name).estimate(measure, y)
 
 
 def _row(

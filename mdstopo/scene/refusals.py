@@ -7,13 +7,11 @@ from collections.abc import Iterator
 from mdstopo.case.errors import Mistake
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, Objective, Response, ResponseRow, VolumeRow
-from mdstopo.case.words import number_text, shown
+from mdstopo.case.sensitivities import chosen, having
+from mdstopo.case.words import listed, number_text, shown
 from mdstopo.scene.family import beyond_collocation, beyond_springs
 from mdstopo.scene.moving_volumes import moving_volumes
 from mdstopo.settings.optimizers import OPTIMIZERS
-
-#: methods that differentiate by parameters of laws and coordinates of points
-BY_PARAMETERS = frozenset({"auto", "adjoint", "direct"})
 
 
 def no_derivatives(case: Case, method: str) -> tuple[str, str]:
@@ -23,7 +21,8 @@ def no_derivatives(case: Case, method: str) -> tuple[str, str]:
     else:
         named = not any(each.groups for each in case.variables)
         place, what = "design.variables", "defined names" if named else "parameters of laws"
-    return place, f"{method} gives no derivatives by {what}; adjoint does, and direct"
+    does = ", and ".join(f"{name} does" if not i else name for i, name in enumerate(having("by_parameters")))
+    return place, f"{method} gives no derivatives by {what}; {does}"
 
 
 def refusals(case: Case) -> list[Mistake]:
@@ -52,10 +51,12 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
     moving = moving_volumes(case)
     for i, row in enumerate(case.constraints):
         volume = isinstance(row, VolumeRow) and i not in moving
-        if not (optimizer.takes_volumes if volume else optimizer.takes_limits):
+        needed = "takes_volumes" if volume else "takes_limits"
+        if not getattr(optimizer, needed):
+            others = " or ".join(kind.name for kind in OPTIMIZERS.values() if getattr(kind, needed))
             what = "volumes" if volume else "sums of lengths that vary" if i in moving else "responses"
-            yield f"constraints[{i}]", f"the optimiser {optimizer.name} takes no limits on {what}; gsao does"
-    if case.variables and solver.sensitivity not in BY_PARAMETERS:
+            yield f"constraints[{i}]", f"the optimiser {optimizer.name} takes no limits on {what}; {others} does"
+    if case.variables and not chosen(solver.sensitivity).by_parameters:
         yield "solver.sensitivity", no_derivatives(case, solver.sensitivity)[1]
     for group in case.priced_groups:
         yield from _unpriced(case, group)
@@ -119,5 +120,6 @@ def _unpriced(case: Case, group: MemberGroup) -> Iterator[tuple[str, str]]:
             yield where, f"priced does not go with design.{key}"
     if case.solver.settle:
         yield where, "priced does not go with static settling: a little of any candidate moves the start"
-    if case.solver.sensitivity not in ("auto", "adjoint"):
-        yield where, f"priced needs sensitivity: adjoint, not {case.solver.sensitivity}"
+    if not chosen(case.solver.sensitivity).of_candidates:
+        needed = listed(having("of_candidates"))
+        yield where, f"priced needs sensitivity: {needed}, not {case.solver.sensitivity}"

@@ -14,6 +14,7 @@ from mdstopo.plan.front_plan import NoEndError, Planner, Request, Starts
 from mdstopo.plan.priced_designs import packed
 from mdstopo.plan.solve_task import Found, Result, Task, front_key, solve
 from mdstopo.plan.stored_tasks import begun_part, tasks_part
+from mdstopo.settings.scalarisations import SCALARISATIONS, SUM
 from mdstopo.starts.callbacks import ignore
 from mdstopo.starts.evaluator_interface import Engine
 from mdstopo.store.contents import Datasets
@@ -67,8 +68,8 @@ class Combining:
             return None
         weights = np.array([combine.weights[objective.name] for objective in case.objectives])
         if np.count_nonzero(weights) == 1:
-            return Scalarisation("weighted_sum", weights)  # Eq. 24 would change nothing but its unit
-        if not combine.normalize or combine.method == "weighted_product":
+            return Scalarisation(SUM, weights)  # Eq. 24 would change nothing but its unit
+        if not (combine.normalize and SCALARISATIONS[combine.method].scaled):
             return Scalarisation(combine.method, weights, exponent=combine.exponent)
         signs = np.array([sign_of(objective) for objective in case.objectives])
         if self.fixed is not None:

@@ -49,24 +49,23 @@ def residual(kkt: float) -> str:
 def holders(case: Case, state: State) -> list[str]:
     """The objective and the constraints whose rows carry the largest share of the Lagrangian's gradient, that first.
 
-    Known of the bundle method; empty where another one ended the run.
+    Empty where the optimiser does not tell.
     """
-    rows = state.bundle
-    if not state.uses_bundle or state.restoring or not len(rows) or len(rows) != len(state.multipliers):
+    groups, weights = state.row_shares()
+    if not len(groups):
         return []
-    weights = state.multipliers * rows.steepest
     whose = [-1]
     for index, row in enumerate(case.constraints):
         if isinstance(row, ResponseRow):
             whose += [index] * len(SIGNS[row.sense])
     shares: dict[int, float] = {}
-    for group, weight in zip(rows.group.tolist(), weights.tolist(), strict=True):
+    for group, weight in zip(groups.tolist(), weights.tolist(), strict=True):
         if group < len(whose):
             shares[whose[group]] = shares.get(whose[group], 0.0) + weight
     total = sum(shares.values())
     order = sorted((index for index in shares if index >= 0), key=lambda index: (-shares[index], index))
     named = [index for index in order if shares[index] > SHARE * total][:NAMED]
-    competing = int(np.count_nonzero((rows.group == 0) & (weights > SHARE * total)))
+    competing = int(np.count_nonzero((groups == 0) & (weights > SHARE * total)))
     peaks = f" ({competing} rows compete)" if competing > 1 else ""
     return [f"the objective{peaks}", *(f"constraints[{i}] ({_what(case, i)})" for i in named)]
 

@@ -222,7 +222,7 @@ class SizeSearch:
         if state is None:
             return
         x, value = state.best_alpha, float(state.best_objective)
-        slope = state.gradients[0] if len(state.gradients) else np.zeros(len(x))
+        slope = state.slope()
         self._try_near(node, x, slope)
         if value >= self._cutoff() or not len(node.low):
             return

@@ -45,6 +45,9 @@ PRESETS: dict[str, dict[str, Value]] = {
     "slp": {"bundle": False, "power": 1.0, "convex_start": 0.0},
 }
 
+#: the optimiser of cases that name none
+DEFAULT_OPTIMIZER = "gsao"
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
@@ -58,7 +61,7 @@ class Settings:
     max_iterations: int = 200
     tolerance: float = 1e-6
     options: Mapping[str, Value] = field(default_factory=lambda: resolve("default", {}))
-    optimizer: str = "gsao"
+    optimizer: str = DEFAULT_OPTIMIZER
 
     def number(self, name: str) -> float:
         """The option `name` as a float."""
@@ -114,7 +117,7 @@ def settings(
     *,
     max_iterations: int = 200,
     tolerance: float = 1e-6,
-    optimizer: str = "gsao",
+    optimizer: str = DEFAULT_OPTIMIZER,
 ) -> Settings:
     """`Settings` from a preset and single settings. Raises ValueError as `resolve` does, and for a count
     below zero."""

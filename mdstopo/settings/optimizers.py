@@ -6,20 +6,22 @@ What a record names has the interface of `optimizer.interface`. Imports nothing 
 from typing import NamedTuple
 
 from mdstopo.settings.optimizer_options import OPTIONS
-from mdstopo.settings.optimizer_presets import PRESETS
+from mdstopo.settings.optimizer_presets import DEFAULT_OPTIMIZER, PRESETS
 
 
 class OptimizerKind(NamedTuple):
     """An optimiser.
 
     name: as case files have it; doc: a sentence for the case reference. made_by: module:class, called with the problem
-    and `Settings`. options, presets: names of the single settings and of the named ones that it takes; `max_iterations`
-    and `tolerance` all do. takes_limits: whether it keeps limits on responses; takes_volumes: on linear rows.
+    and `Settings`; states: module:class of its states, derived from `optimizer.state.State`. options, presets: names of
+    the single settings and of the named ones that it takes; `max_iterations` and `tolerance` all do. takes_limits:
+    whether it keeps limits on responses; takes_volumes: on linear rows.
     """
 
     name: str
     doc: str
     made_by: str
+    states: str
     options: frozenset[str] = frozenset()
     presets: frozenset[str] = frozenset({"default"})
     takes_limits: bool = False
@@ -31,9 +33,10 @@ OPTIMIZERS: dict[str, OptimizerKind] = {
     kind.name: kind
     for kind in (
         OptimizerKind(
-            "gsao",
+            DEFAULT_OPTIMIZER,
             "generalized sequential approximate optimization",
             "mdstopo.optimizer.gsao:Gsao",
+            "mdstopo.optimizer.gsao_state:GsaoState",
             frozenset(OPTIONS),
             frozenset(PRESETS),
             takes_limits=True,

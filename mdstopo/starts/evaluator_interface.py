@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.settings.scalarisations import SUM
 from mdstopo.status import Status
 from mdstopo.store.contents import Motion
 
@@ -59,7 +60,7 @@ MakeEngine = Callable[[Case], Engine]
 def even(case: Case) -> Scalarisation | None:
     """Equal weights of raw values: a U to get ready with, which needs no utopia. None for one objective."""
     count = len(case.objectives)
-    return Scalarisation("weighted_sum", np.full(count, 1.0 / count)) if count > 1 else None
+    return Scalarisation(SUM, np.full(count, 1.0 / count)) if count > 1 else None
 
 
 def problem_of(engine: Engine, scalarisation: Scalarisation | None) -> Problem:

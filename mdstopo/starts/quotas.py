@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.case.stages import stage_count
-from mdstopo.optimizer.safeguards import foreseen
 from mdstopo.optimizer.start_families import Family, begins_at_best, best_run, family_of, rank
 from mdstopo.optimizer.state import State
 from mdstopo.starts.single_start import StartTask
@@ -279,7 +278,7 @@ def _ahead(state: State) -> tuple[float, Floats]:
     limits."""
     if not state.running:
         return state.best_objective, state.best_alpha
-    return float("nan") if state.restoring else foreseen(state), state.trial
+    return state.foreseen(), state.trial
 
 
 @dataclass(frozen=True, slots=True)

@@ -148,7 +148,7 @@ def soften(settings: Settings, problem: Problem, first: Floats | None, stop: Sto
     limits; None where it was stopped."""
     optimizer = make(problem.softened(SOFT_STRENGTH), settings)  # type: ignore[attr-defined]
     state = optimizer.start(first)
-    while state.running and not state.restoring and state.iteration < SOFT_ITERATIONS:
+    while state.running and not state.is_restoring and state.iteration < SOFT_ITERATIONS:
         if stop():
             return None
         state = optimizer.step(state)

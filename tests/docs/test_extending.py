@@ -23,6 +23,9 @@ JOINED = [
     ["tests/cli/test_finalize.py", "-k", "which_keys_are_forces or forces_scaled"],
     ["tests/general/test_random_scenes.py", "-k", "gradients"],
     ["tests/general/test_orders.py", "-k", "classical"],
+    ["tests/optimizer/test_scalarisation.py"],
+    ["tests/robust/test_measures.py", "-k", "slopes"],
+    ["tests/robust/test_samples.py", "-k", "interval"],
     ["tests/docs/test_generated.py"],
 ]
 

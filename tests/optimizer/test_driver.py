@@ -364,6 +364,14 @@ def test_a_missing_array_is_named():
         State.from_arrays(arrays)
 
 
+def test_states_of_files_that_do_not_name_their_optimiser_are_those_of_gsao():
+    problem, _ = compliance_problem()
+    state = Gsao(problem, settings()).start()
+    arrays = state.to_arrays()
+    del arrays["optimizer"]
+    same(State.from_arrays(arrays), state)
+
+
 def test_an_interruption_between_iterations_loses_nothing():
     problem, _ = compliance_problem()
     optimizer = Gsao(problem, settings(max_iterations=10, tolerance=0.0))

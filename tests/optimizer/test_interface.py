@@ -1,13 +1,15 @@
 """A second optimiser: a record and a class with three functions, and runs, files and refusals know it."""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
 import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
-from mdstopo.optimizer.interface import first_state, make, reopen, run
-from mdstopo.optimizer.safeguards import plain_violation, scaled_violation
+from mdstopo.optimizer.interface import known_at_first, make, reopen, run
 from mdstopo.optimizer.state import State
 from mdstopo.scene.refusals import refusals
 from mdstopo.settings.optimizer_presets import settings
@@ -36,8 +38,18 @@ def bowl():
     return Toy(lambda x: (np.array([w @ (x - c) ** 2]), (2.0 * w * (x - c))[None]), np.full(3, 0.5), 0.0, 1.0)
 
 
+@dataclass(slots=True)
+class DescentState(State):
+    """What steepest descent remembers beside its design: the slope there, and the length of the next step."""
+
+    optimizer: ClassVar[str] = "descent"
+
+    gradient: np.ndarray
+    length: float
+
+
 class Descent:
-    """Steepest descent along the highest row within the bounds; its step length is the state's trust."""
+    """Steepest descent along the highest row within the bounds."""
 
     def __init__(self, problem, settings):
         self.problem, self.settings = problem, settings
@@ -46,7 +58,7 @@ class Descent:
         first = self.problem.initial if initial is None else initial
         alpha = np.clip(np.asarray(first, dtype=np.float64), self.problem.lower, self.problem.upper)
         sample = self.problem.evaluate(alpha)
-        state = first_state(alpha, sample, trust=0.1)
+        state = DescentState(**known_at_first(alpha, sample), gradient=sample.gradients[0], length=0.1)
         return self._finish(self._propose(state), sample, True)
 
     def step(self, state):
@@ -56,11 +68,10 @@ class Descent:
         sample = self.problem.evaluate(state.trial)
         better = sample.objective < state.objective
         if better:
-            state.take(sample, scaled_violation(sample))
-            state.best_alpha = state.trial
-            state.best_objective, state.best_violation = sample.objective, state.violation
-            state.best_plain = plain_violation(sample)
-        state.trust *= 1.5 if better else 0.3
+            state.alpha = state.best_alpha = state.trial
+            state.objective = state.best_objective = sample.objective
+            state.gradient = sample.gradients[0]
+        state.length *= 1.5 if better else 0.3
         return self._finish(self._propose(state), sample, better)
 
     def terminate(self, state):
@@ -71,8 +82,8 @@ class Descent:
         return RunStatus.RUNNING, ""
 
     def _propose(self, state):
-        slope = state.gradients[0] / max(np.abs(state.gradients[0]).max(), 1e-300)
-        state.trial = np.clip(state.alpha - state.trust * slope, self.problem.lower, self.problem.upper)
+        slope = state.gradient / max(np.abs(state.gradient).max(), 1e-300)
+        state.trial = np.clip(state.alpha - state.length * slope, self.problem.lower, self.problem.upper)
         state.kkt = float(np.abs(state.trial - state.alpha).max())
         return state
 
@@ -86,7 +97,8 @@ class Descent:
 @pytest.fixture(autouse=True)
 def registered(monkeypatch):
     """The optimiser as a distribution would have entered it."""
-    monkeypatch.setitem(OPTIMIZERS, "descent", OptimizerKind("descent", "steepest descent", f"{__name__}:Descent"))
+    kind = OptimizerKind("descent", "steepest descent", f"{__name__}:Descent", f"{__name__}:DescentState")
+    monkeypatch.setitem(OPTIMIZERS, "descent", kind)
 
 
 def case_of(more=""):
@@ -120,9 +132,25 @@ def test_a_state_survives_its_arrays_and_a_moved_limit():
     assert state.status is RunStatus.MAX_ITERATIONS
     longer = make(bowl(), settings(max_iterations=9, optimizer="descent"))
     again = reopen(longer, State.from_arrays(state.to_arrays()))
+    assert isinstance(again, DescentState)
     assert again.running
     straight = run(longer)
     assert run(longer, again).best_alpha.tobytes() == straight.best_alpha.tobytes()
+
+
+def test_what_it_does_not_tell_of_its_own_part_is_not_known():
+    state = make(bowl(), settings(optimizer="descent")).start()
+    assert not state.is_restoring
+    assert np.isnan(state.foreseen())
+    assert not state.slope().any()
+    assert not len(state.row_shares()[0])
+
+
+def test_a_state_of_an_optimiser_that_is_not_known_is_refused(monkeypatch):
+    arrays = make(bowl(), settings(optimizer="descent")).start().to_arrays()
+    monkeypatch.delitem(OPTIMIZERS, "descent")
+    with pytest.raises(KeyError, match="descent"):
+        State.from_arrays(arrays)
 
 
 def test_settings_that_it_does_not_take_are_mistakes():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mdstopo.optimizer.problem import Sample
-from mdstopo.optimizer.safeguards import scaled_violation
+from mdstopo.optimizer.violations import scaled_violation
 
 
 @pytest.mark.parametrize(("slope", "found"), [(10.0, 2e-6), (1.0, 2e-6), (0.1, 2e-5), (0.0, 2e-6)])

@@ -9,11 +9,12 @@ from mdstopo.compiler.jit import vector_entry
 from mdstopo.compiler.threads import VARIABLE
 from mdstopo.optimizer import gsao, separable, wide, wide_numbers
 from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.gsao_state import Step
 from mdstopo.optimizer.powers import largest, powers, primitives
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.safeguards import next_shift
 from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.state import State, Step
+from mdstopo.optimizer.state import State
 from mdstopo.optimizer.wide_kernels import COARSER, FEWEST
 from mdstopo.optimizer.wide_slots import BEYOND, ROOM, ROW, SLOTS, WHOLE, bracket_slots, enter_slot, root
 from mdstopo.settings.optimizer_presets import settings

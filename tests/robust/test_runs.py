@@ -18,8 +18,7 @@ from mdstopo.cli import _dispatch
 from mdstopo.evaluators import evaluator_of
 from mdstopo.robust import points_in_workers
 from mdstopo.robust.conclusion import conclude
-from mdstopo.robust.intervals import estimate
-from mdstopo.robust.robust_measures import statistic
+from mdstopo.robust.robust_measures import estimate, statistic
 from mdstopo.robust.sample import lattice
 from mdstopo.session.run_session import run_session
 from mdstopo.workers.worker_pool import Lost, WorkerError

@@ -5,7 +5,8 @@ import pytest
 from scipy import stats
 
 from mdstopo.case.uncertain import Discrete, Lognormal, Measure, Normal, Uniform
-from mdstopo.robust.intervals import estimate, student
+from mdstopo.robust.intervals import student
+from mdstopo.robust.robust_measures import estimate
 from mdstopo.robust.sample import check_sample, design_sample, generators, lattice
 from tests.robust.scenes import SCENARIOS, read, uncertain
 
