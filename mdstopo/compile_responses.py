@@ -1,6 +1,7 @@
 """What `warm.Beside` runs in another process: `python -m mdstopo.compile_responses INTEGRATOR [MODULE...]`.
 
-It compiles what looks at the steps of an integrator; before that, the `compile_share` of each module.
+It compiles the kernels that evaluate responses on the steps of an integrator; before that, the `compile_share` of each
+module.
 """
 
 import gc
@@ -14,7 +15,7 @@ from mdstopo.warm import tiny
 
 
 def compile_responses(integrator: str) -> None:
-    """Compile here what looks at the steps of an integrator: the work of the other process."""
+    """Compile the kernels that evaluate responses on an integrator's steps; another process compiles the integrator."""
     driver = Evaluator(tiny(integrator), beside=False).driver("default")
     assert isinstance(driver, Driver)
     driver.compile_responses()

@@ -328,7 +328,7 @@ def sign_of(objective: Objective) -> float:
 
 
 def competes(looked: Objective | ResponseRow, sign: float) -> bool:
-    """Whether all peaks of what is looked at bound sign times its value from above."""
+    """Whether every competing peak of an objective or a constraint is a lower bound of sign times its value."""
     if kind_of(looked.response).of_members and looked.over_time == "final":
         return sign > 0.0  # members compete at the end, too
     return looked.over_time in (("max", "max_abs") if sign > 0.0 else ("min",))

@@ -1,8 +1,7 @@
 """A case, compiled once: evaluate designs, simulate, hand the optimiser its problem.
 
-`Evaluator` reads like the paper's Section III.C: simulate the load cases that somebody looks at, look at the
-objectives, differentiate, look at the constraints. Each load case is one scene; objectives of one load case share its
-simulation.
+`Evaluator` reads like the paper's Section III.C: simulate the load cases that objectives or constraints are of,
+evaluate these, differentiate. Each load case is one scene; objectives of one load case share its simulation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
     from mdstopo.scene.design_map import DesignMap
     from mdstopo.sensitivity.candidate_pass import CandidatePass
 
-#: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
+#: the motion is computed to the tolerance of the responses; looser than this to half of it, because a gradient may
 #: else exceed ten tolerances on scenes whose members turn fast
 LOOSEST = 5e-5
 
@@ -105,7 +104,7 @@ class Evaluator:
         self._design = Design(case)
         self._rows = self._design.rows.view()
         self._rows.flags.writeable = False
-        # what is looked at in each load case: objectives, then constraints on a response
+        # the responses of each load case: objectives, then constraints on a response
         bounded = {i: row for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
         limited = {f"constraints[{i}]": row for i, row in bounded.items()}
         self._limited = dict(zip(bounded, limited, strict=True))
@@ -370,7 +369,7 @@ class Evaluator:
 
     @cached_property
     def _seen(self) -> list[tuple[str, tuple[str, ...], SceneDriver]]:
-        """The load cases that objectives or constraints look at: name, the names of these, driver."""
+        """The load cases that objectives or constraints are of: name, the names of these, driver."""
         return [(name, tuple(looked), self.driver(name)) for name, looked in self._by_load_case.items() if looked]
 
     def _without_slope(self, design: FloatArray, gradient: bool) -> str:
@@ -524,7 +523,7 @@ def _of_motion(tolerance: float) -> float:
 
 
 def _has_slopes(looked: Mapping[str, tuple[Peak, ...]]) -> bool:
-    """Whether all derivatives of what was looked at are finite."""
+    """Whether all derivatives of the responses are finite."""
     rows = (peak.gradient for peaks in looked.values() for peak in peaks)
     return all(row is None or bool(np.isfinite(row).all()) for row in rows)
 
@@ -543,14 +542,14 @@ def _peaks(
 ) -> tuple[Peak, ...]:
     """What was found of objective j; gradients (n_obj, R, N) and across of all rows, of which copies are kept."""
     peaks: tuple[Peak, ...] = ()
-    gradient = aside = None
+    gradient = across_of_row = None
     rows = result.rows.item
     for r in range(result.found.item(j)):
         if gradients is not None:
             gradient = gradients[j, r].copy()
             gradient.setflags(False)
         if across is not None and shape == "norm":
-            aside = across[j, r].copy()
-            aside.setflags(False)
-        peaks += (Peak(rows(j, r, 0), rows(j, r, 1), gradient, aside, shape),)
+            across_of_row = across[j, r].copy()
+            across_of_row.setflags(False)
+        peaks += (Peak(rows(j, r, 0), rows(j, r, 1), gradient, across_of_row, shape),)
     return peaks

@@ -1,6 +1,6 @@
 """How far an evaluation is from the exact motion's: the same once more, much finer, and the difference.
 
-An embedded estimate would be cheaper, but it is of the motion, not of what is looked at: peaks, events and the reverse
+An embedded estimate would be cheaper, but it is of the motion, not of responses: peaks, events and the reverse
 sweep have errors of their own. A finer evaluation has them all, smaller. Adaptive steps are computed to a thousandth of
 the tolerance, and again to a thousandth of that where no step has changed. Fixed steps are halved; where the method is
 of second order a third is added, which is what the halved steps still lack.
@@ -26,7 +26,7 @@ FINER = 1e-3
 TIGHTEST, COARSEST = 1e-13, 1e-6
 #: what rounding leaves in sums over a motion, relative
 ROUNDING = 1e-15
-#: other roundings that are looked at
+#: other roundings that are computed
 SAMPLES = 1, 2
 
 

@@ -1,4 +1,4 @@
-"""`mdstopo bench skip`: what is left out where nothing asks for it, counted and timed with and without.
+"""`mdstopo bench skip`: what is skipped where nothing needs it, counted and timed with and without.
 
 Each omission is a pair of cases that differ in just the thing that may be left out, and a count of work. Where the
 count is the same on both sides, only the time of each unit can differ.

@@ -1,4 +1,4 @@
-"""What is looked at and asked for: responses, objectives, constraints, and the settings of the methods."""
+"""What is to be achieved: responses, objectives, constraints, and the settings of the methods."""
 
 from __future__ import annotations
 

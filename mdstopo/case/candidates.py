@@ -70,7 +70,7 @@ def coincident(first: FloatArray, second: FloatArray, tolerance: float) -> tuple
 
 
 def most_cost(group: MemberGroup) -> float:
-    """What a member of a priced group costs at most: its cost, or the size of what its points span."""
+    """What a member of a priced group costs at most: its cost, or the diagonal of all points for a length."""
     assert group.candidates is not None
     if group.candidates.cost is not None:
         return group.candidates.cost

@@ -31,7 +31,7 @@ def exchange_ends(groups: Sequence[MemberGroup], alpha: FloatArray, side: Side, 
 
 
 def _places(group: MemberGroup, side: Side, rng: np.random.Generator) -> IndexArray:
-    """Which member's value each one takes (M,): its own where none joins its points after the exchange."""
+    """For each member (M,), the one whose value it takes: that between its points after the exchange, else itself."""
     n_from, n_to = len(group.from_local), len(group.to_local)
     of_from, of_to = np.arange(n_from), np.arange(n_to)
     if side == "from":

@@ -55,7 +55,7 @@ def response_of(stated: Any, frames: Frames, reading: Reading) -> Response | Non
 
 
 def make_expression(word: str, keys: Fields, frames: Frames, reading: Reading) -> Response | None:
-    """The response; None where something is a mistake, which is noted."""
+    """The response; None where there is a mistake, which is noted."""
     made = {name: response_of(stated, frames, reading) for name, stated in keys["of"].items()}
     parameters: Mapping[str, float] = keys["parameters"] or {}
     path = inside(keys.path, "formula")

@@ -136,7 +136,7 @@ def load_case_of(fields: Fields, top: Fields, reading: Reading) -> str | None:
 
 
 def build_response(fields: Fields, frames: Frames, reading: Reading) -> Response | None:
-    """What an objective or a constraint looks at."""
+    """The response of an objective or a constraint."""
     return response_of(fields["response"], frames, reading)
 
 

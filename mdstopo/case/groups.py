@@ -19,7 +19,7 @@ from mdstopo.case.words import count_text, inside, number_text
 
 CHUNK = 1 << 18
 MOST_CANDIDATES = 10**10
-"""Pairs that filters may look at, or that may be priced; more would take minutes."""
+"""Pairs that filters may try, or that may be priced; more would take minutes."""
 PRICED = "priced"
 
 

@@ -130,12 +130,12 @@ class ScalarInPlane(Number):
 
 
 def has_unit(node: Node) -> bool:
-    """Whether a node is a number with something behind it, in quotes."""
+    """Whether a node is a text that begins with a number, as one with a unit does."""
     return node.kind == SCALAR and not node.plain and is_quantity(node.text)
 
 
 def with_unit(node: Node, path: str, reading: Reading) -> float | Bad:
-    """The number of such a node in the SI unit of its key, or BAD."""
+    """The number of a node with a unit (`has_unit`), in the SI unit of its key, or BAD."""
     needed = unit_at(reading.unit, path)
     try:
         if not needed or needed == "the number's unit":

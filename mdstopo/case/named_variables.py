@@ -112,7 +112,7 @@ def build_follows(
 
 
 def _reaching(variable: Variable, numbers: Sequence[Following], groups: Mapping[str, MemberGroup]) -> Variable:
-    """The variable with the groups in which something follows from it, and the points that do."""
+    """The variable with the groups that have numbers which follow from it, and the points that do."""
     grids = tuple(dict.fromkeys(each.grid for each in numbers if each.grid))
     ending = [group.name for group in groups.values() if {group.from_points, group.to_points} & set(grids)]
     reached = dict.fromkeys([*(each.group for each in numbers if each.group), *ending])

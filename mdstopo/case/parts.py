@@ -22,7 +22,7 @@ from mdstopo.case.value import Value, frozen
 
 @frozen
 class Outline(Value):
-    """What pictures show of a body; nothing else looks at it.
+    """What pictures show of a body; nothing is computed from it.
 
     shape: the word of the case. corners (n, 2), in space (n, 3): in body coordinates. faces: numbers of corners; in the
     plane each is a closed line, and what lies within two of them is a hole; in space each is a flat piece of the

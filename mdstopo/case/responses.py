@@ -1,4 +1,4 @@
-"""What can be looked at over time: what is declared of each response, one record a response.
+"""Responses, which are numbers of a state over time: what is declared of each response, one record a response.
 
 How a response is computed stands in `mdstopo.general`, in what its record names.
 """

@@ -225,7 +225,7 @@ _SENSE = explained({"minimize": "the lower, the better", "maximize": "the higher
 OBJECTIVE = Record(
     "an objective",
     (
-        Key("response", _RESPONSE, "what is looked at over time", required=True),
+        Key("response", _RESPONSE, "the number of a state that is followed over time", required=True),
         _OVER_TIME,
         LOAD_CASE_KEY,
         Key("sense", _SENSE, "which way is better", default="minimize"),
@@ -265,7 +265,7 @@ CONSTRAINT = Record(
             ),
             "bounds the sum of alpha_i V_i over these members (Eq. 14)",
         ),
-        Key("response", _RESPONSE, "bounds what is looked at over time"),
+        Key("response", _RESPONSE, "what is bounded over time"),
         Key("over_time", _OVER_TIME.kind, "how the response becomes a number", otherwise="max"),
         LOAD_CASE_KEY,
         Key("limit", NUMBER, "at most this"),

@@ -74,7 +74,7 @@ _LOSSES = explained(
 def fit_record(response: Kind, load_case: Key) -> Record:
     """The section, in a plane or in space.
 
-    response: what may be looked at. load_case: the key that says where.
+    response: the kinds of responses. load_case: the key that says where.
     """
     series = Record(
         "a measured series",

@@ -360,7 +360,7 @@ _CASE = with_keys(
     with_kind(LOAD_CASE, "motions", _MOTIONS.kind),
 )
 
-# What is looked at.
+# Responses.
 _RESPONSE = response_kinds(SPATIAL_RESPONSES, IN_PLANE_ALONE)
 _OBJECTIVE = with_keys(OBJECTIVE, with_kind(OBJECTIVE, "response", _RESPONSE))
 _CONSTRAINT = with_keys(CONSTRAINT, with_kind(CONSTRAINT, "response", _RESPONSE))

@@ -1,4 +1,4 @@
-"""What can be looked at over time in space. See `mdstopo.case.responses`."""
+"""Responses in space. See `mdstopo.case.responses`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units of what is looked at, for axes and attributes."""
+"""Units of responses, for axes and attributes."""
 
 from mdstopo.case.aims import Objective, Response
 from mdstopo.case.responses import kind_of

@@ -164,7 +164,7 @@ def _complain(sentence: str) -> None:
 
 
 def _flushed(status: int) -> int:
-    """Flush while it can still be said quietly that nobody listens any more."""
+    """Flush the output while a closed pipe can still be ignored."""
     import os
 
     for stream in (sys.stdout, sys.stderr):

@@ -137,7 +137,7 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
 
 
 def _say_cost(output: Output, case: "Case", engine: "Evaluator") -> dict[str, Any] | None:
-    """What one evaluation will cost, where something is looked at."""
+    """What one evaluation will cost, where there are responses."""
     from mdstopo.cli.check_cost import cost, in_words
 
     found = cost(case, engine)

@@ -14,7 +14,7 @@ ONCE = 2.0
 def cost(case: "Case", engine: "Evaluator") -> dict[str, Any] | None:
     """Steps, force sums and milliseconds of one evaluation with gradients at the start, and the points of its sample.
 
-    With a message alone where it fails; None where nothing is looked at, or kernels would have to be compiled first.
+    With a message alone where it fails; None where there are no responses, or kernels would have to be compiled first.
     """
     from mdstopo.compiler.entry import NotCompiledError, without_compiling
 

@@ -46,7 +46,7 @@ class CaseFile(FileOf):
     """The path of a case file, or the name of a case that comes with the package."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Files, and names of cases that begin so, where something was typed."""
+        """Files, and the names of cases that begin with what was typed."""
         found = super().shell_complete(ctx, param, incomplete)
         if not incomplete or "/" in incomplete:
             return found

@@ -24,7 +24,7 @@ _MJCF = {"hinge": "revolute", "slide": "prismatic", "ball": "spherical"}
 
 @dataclass
 class Frame:
-    """Where something is: place (3,) in m; turn (3, 3), its columns are the axes."""
+    """A place (3,) in m, and a turn (3, 3), whose columns are the axes."""
 
     place: Floats = field(default_factory=lambda: np.zeros(3))
     turn: Floats = field(default_factory=lambda: np.eye(3))
@@ -66,7 +66,7 @@ class Tree:
     told: list[str] = field(default_factory=list)
 
     def tell(self, sentence: str) -> None:
-        """Note something once."""
+        """Note a remark, once."""
         if sentence not in self.told:
             self.told.append(sentence)
 

@@ -89,7 +89,7 @@ _OBEYED = {
 
 
 def harmless(text: str) -> str:
-    """A text without anything that a terminal obeys: titles and names come from files of anybody."""
+    """A text without anything that a terminal obeys: titles and names may come from files of strangers."""
     return text.translate(_OBEYED)
 
 

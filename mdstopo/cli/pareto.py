@@ -161,7 +161,7 @@ def _asked(
 
 
 def _directions(case: "Case", weights: str | None, points: int | None) -> "NDArray[np.float64]":
-    """The points that are asked for, (W, m)."""
+    """Weights or anchors of the points of the front, (W, m)."""
     import numpy as np
 
     from mdstopo.front.directions import lattice, parse_range, weights_of_first

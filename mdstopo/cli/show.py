@@ -217,7 +217,7 @@ def _say_members(output: Output, view: "ResultView", count: int) -> None:
 
 
 def _say_bounds(output: Output, view: "ResultView") -> dict[str, Any]:
-    """What no members do better, where theory gives a bound; the same for machines."""
+    """Print the bounds that no members can do better than, where theory gives them; the same as data."""
     from mdstopo.cli.bound import document, result_bounds, say_bounds
 
     known = result_bounds(view)

@@ -100,7 +100,7 @@ def _run(output: Output, scenes: "Sequence[Scene]", markdown: bool) -> "list[Out
 
 
 def row(outcome: "Outcome") -> list[str]:
-    """What the table says of an outcome."""
+    """The cells of the table for an outcome."""
     scene = outcome.scene
     return [
         scene.name,

@@ -1,4 +1,4 @@
-"""What the scene says where something was measured, and its derivatives by the numbers that are fitted."""
+"""Responses at the times of the measurements, and their derivatives by the numbers that are fitted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -126,7 +126,7 @@ class Predictions:
             return self.case.solver.integrator
 
     def _times(self, load_case: str, delays: FloatArray) -> tuple[FloatArray, list[IndexArray]]:
-        """Times (K,) of one load case at which something was measured, and where those of each series are."""
+        """Times (K,) of all measurements of one load case, and the places of each series' times among them."""
         window = self.case.load_case(load_case)
         own = [
             np.clip(self._measured[s].t - delays[s], window.start, window.end) for s in self._by_load_case[load_case]

@@ -1,4 +1,4 @@
-"""The case that is simulated for a fit: what was measured is looked at, nothing is designed, numbers are put in."""
+"""The case that is simulated for a fit: responses are what was measured, nothing is designed, numbers are put in."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -34,7 +34,7 @@ def case_at(case: Case, keys: Sequence[str], x: FloatArray) -> Case:
 
 
 def prepared(case: Case) -> Case:
-    """The case that looks at the measured responses alone, with its design variables at their initial values."""
+    """The case with the measured responses alone, with its design variables at their initial values."""
     assert case.fit is not None
     # the reduction is never taken: one that only the general kernels know has the case be theirs
     looked = tuple(Objective(each.name, each.response, "max_abs", each.load_case) for each in case.fit.series)

@@ -80,7 +80,7 @@ def _digests(problem: FitProblem) -> Datasets:
 
 
 def _motions(run: FitRun) -> dict[str, Any]:
-    """The fitted motion in each load case that something was measured in."""
+    """The fitted motion in each load case with measurements."""
     if run.found is None:
         return {}
     numbers = run.problem.numbers
@@ -199,7 +199,7 @@ def asked(problem: FitProblem) -> str:
 
 
 def fitted_case(view: ResultView, case: Case) -> Case:
-    """The case that is looked at in pictures: with the fitted numbers, and the measured series as its objectives.
+    """The case that pictures are of: with the fitted numbers, and the measured series as its objectives.
 
     case: that of the file, with the numbers as they were stated.
     """

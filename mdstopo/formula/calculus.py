@@ -219,7 +219,7 @@ def _slope_of_powlog(part: Expression, slopes: list[Expression]) -> Expression:
 
 
 def _slope_of_extreme(operator: str, u: tuple[Expression, ...], slopes: list[Expression]) -> Expression:
-    """Of the least or largest: that of the first one that is it."""
+    """The slope of `min` or `max`: that of the first operand that is the least or largest."""
     best, slope = u[0], slopes[0]
     sign = "<" if operator == "min" else ">"
     for each, of_each in zip(u[1:], slopes[1:], strict=True):

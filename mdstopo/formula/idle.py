@@ -70,7 +70,7 @@ def idle_sides(formulas: tuple[Expression, ...], guards: Sequence[tuple[Expressi
 
 
 def _first_switch(roots: tuple[Expression, ...]) -> int | None:
-    """The switch that is asked for first in some formulas; None where there is none."""
+    """The switch that is evaluated first in some formulas; None where they have none."""
     words = (word for word in names_in(*roots) if word.startswith("bit "))
     return next((int(word.removeprefix("bit ")) for word in words), None)
 

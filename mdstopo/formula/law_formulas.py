@@ -55,7 +55,7 @@ class Guard(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Formulas that are computed together, and what has to have a value where they are."""
+    """Formulas that are computed together; guards: what must hold where they are, so that they have values."""
 
     values: tuple[Expression, ...]
     guards: tuple[Guard, ...] = ()

@@ -72,7 +72,7 @@ def parse(text: str, names: Collection[str] | None = None) -> Formula:
 
 
 def reserved(word: str) -> bool:
-    """Whether a word means something in all formulas, so that nothing can be called so."""
+    """Whether a word has a meaning in all formulas, so that no name can be this word."""
     return word in FUNCTIONS or word in CONSTANTS
 
 

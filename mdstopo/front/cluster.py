@@ -40,7 +40,7 @@ def _version() -> str:
 
 
 def _is_no_lost_connection(record: logging.LogRecord) -> bool:
-    """Whether what Dask has to say is something else than that the scheduler does not answer any more.
+    """Whether a message of Dask tells of anything but a scheduler that does not answer any more.
 
     What ends its attempts to connect again is an error that was raised from a lost connection, or the client's end.
     """

@@ -1,4 +1,4 @@
-"""The points of a front that are asked for: weights, or evenly spaced anchors, as rows (W, m) that sum to 1."""
+"""The points that a front is to have: weights, or evenly spaced anchors, as rows (W, m) that sum to 1."""
 
 import math
 from itertools import combinations

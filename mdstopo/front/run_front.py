@@ -332,7 +332,7 @@ class _FrontRun:
         return failed(task.point, "", task.start, len(self.case.objectives), result.reason)
 
     def hold(self, key: str, state: State) -> None:
-        """Take in how far a task has come, and write it where that is due."""
+        """Keep the state that a task has reached, and write a checkpoint where one is due."""
         self.begun[key] = state
         if self.saver is not None:
             self.saver.offer()

@@ -1,6 +1,6 @@
 """Scenes in full generality: joints, prescribed motions, every member law, every response.
 
-The scenes of springs between free bodies, looked at by their stored energy, have kernels of their own (`mechanics`,
+Scenes of springs between free bodies whose responses are stored energies have kernels of their own (`mechanics`,
 `integrators`, `sensitivity`), which know nothing of what is here. This package computes everything else, and the same
 scenes too, by its own formulas, so that the two families check each other.
 
@@ -8,6 +8,6 @@ scenes too, by its own formulas, so that the two families check each other.
     forces       all that acts              accelerations  with multipliers, from forces
     projection   back onto the joints       events         members that switch
     adaptive_steps, generalized_alpha, gauss               steps through time
-    step_history what they leave behind     responses      what is looked at
+    step_history what they leave behind     responses      numbers of a state
     adjoint, direct                         general_driver what Python calls
 """

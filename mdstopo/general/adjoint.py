@@ -44,11 +44,11 @@ from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, 
 from mdstopo.integrators.steps import FORCES
 from mdstopo.mechanics.kinematics.kinematics_interface import difference, retract
 
-#: an integrand that is a norm has no direction at a stage where it is below ASIDE of its value inside the step: it is
-#: given that of a state which is INWARDS of the way from there, where even one that has passed zero has not; below
-#: VANISHING, any that has kinks may have turned round; and two forces may differ by VANISHING, relative, where one
-#: takes over from the other as the largest
-ASIDE, INWARDS, VANISHING = 1e-6, 4e-6, 0.02
+#: at a stage where an integrand has a kink, its limit from inside the step is taken. Shares of its value at a stage
+#: inside: a norm below NO_DIRECTION has none and is given that of a state KINK_OFFSET of the way to that stage; below
+#: KINK_THRESHOLD a norm or an absolute value may have turned round since, and two forces may differ by that much where
+#: one takes over from the other as the largest
+NO_DIRECTION, KINK_OFFSET, KINK_THRESHOLD = 1e-6, 4e-6, 0.02
 
 
 @kernel
@@ -118,7 +118,7 @@ def sweep(
     In and out:
       lam_q, lam_v (n,): cotangents of coordinates and velocities; at the end those of the start.
       bar_set (slots,): cotangents of the permanent sets.
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
     Out:
       virtual (S, n): virtual displacements of the stages that are gone through; no rows: not wanted.
       out (M_padded + P,): the derivative by alpha^mu and, behind the members, by parameters, added to.
@@ -206,7 +206,7 @@ def row_cotangents(
         differentiated, the direction held.
     In and out:
       history: the history of steps; a partial step is kept behind the others where the integrator needs one.
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
     Out:
       bars (3, n): cotangents of q and v; its last row is overwritten.
       bar_set (slots,): cotangents of the permanent sets.
@@ -319,7 +319,7 @@ def integral_gradient(
       j, square: the response; whether its square is integrated.
       gradient: whether the derivative is asked for.
     In and out:
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
     Out:
       out (M_padded + P,): the derivative, behind the members by parameters.
       start (n,), or no length: cotangents of the start's positions.
@@ -361,7 +361,7 @@ def event_drops(model, member_state, history, count, j, square, workspace):
       history, count: the history of steps, and how many steps it has.
       j, square: the response; whether its square is meant.
     In and out:
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
       workspace: workspace of a balance, overwritten.
     """
     events = history.index[count, EVENTS]
@@ -479,7 +479,7 @@ def sign_at_stage(model, segment, j, who, member_state, history, at):
 
 
 @kernel
-def one_sided(
+def one_sided_limit(
     model, member_state, segment, history, at, inside, j, who, value, mine, size, slopes, rows, workspace, own, own_rows
 ):
     """g_j and its slopes at a stage as they go on from inside the step, which ends where g_j has a kink.
@@ -508,13 +508,13 @@ def one_sided(
         others = np.empty((3, n))
         others_rows = np.empty(model.size[0])
         other, _ = at_stage(model, member_state, segment, history, at, j, mine, workspace, others, others_rows)
-        if other < (1.0 - VANISHING) * value:
+        if other < (1.0 - KINK_THRESHOLD) * value:
             return value, who, same
         own[:] = others
         own_rows[:] = others_rows
         value = other
         who = mine
-    if value > VANISHING * size:
+    if value > KINK_THRESHOLD * size:
         return value, who, same
     if model.response[j, KIND] == MEMBER_FORCE:
         here = sign_at_stage(model, segment, j, who, member_state, history, at)
@@ -522,7 +522,7 @@ def one_sided(
             return value, who, same
         _turn(own, own_rows)
         return -value, who, np.bool_(True)
-    if value <= ASIDE * size:  # no direction of its own: that of a state a little inside
+    if value <= NO_DIRECTION * size:  # no direction of its own: that of a state a little inside
         q = np.empty(model.q0.shape[0])
         v = np.empty(n)
         a = np.empty(n)
@@ -530,12 +530,12 @@ def one_sided(
         way = np.empty(n)
         difference(model, history.stage_q[inside], history.stage_q[at], way)
         for d in range(n):
-            way[d] *= INWARDS
-            v[d] = history.stage_v[at, d] + INWARDS * (history.stage_v[inside, d] - history.stage_v[at, d])
-            a[d] = history.stage_a[at, d] + INWARDS * (history.stage_a[inside, d] - history.stage_a[at, d])
+            way[d] *= KINK_OFFSET
+            v[d] = history.stage_v[at, d] + KINK_OFFSET * (history.stage_v[inside, d] - history.stage_v[at, d])
+            a[d] = history.stage_a[at, d] + KINK_OFFSET * (history.stage_a[inside, d] - history.stage_a[at, d])
         retract(model, history.stage_q[at], way, q)
         for r in range(model.size[0]):
-            lam[r] = history.lam[at, r] + INWARDS * (history.lam[inside, r] - history.lam[at, r])
+            lam[r] = history.lam[at, r] + KINK_OFFSET * (history.lam[inside, r] - history.lam[at, r])
         t = history.when[at]
         response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, own, own_rows)
         return value, who, same
@@ -574,7 +574,7 @@ def integral_cotangents(
       history, count: the history of steps, and how many steps it has.
       j, square: the response; whether its square is integrated.
     In and out:
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
     Out; no derivative is formed where bars has no rows:
       bars (S, 3, n), rows_bar (S, n_row), sets_bar (S, slots): cotangents of the stages' q, v, a, of their multipliers
         and of the permanent sets; zeros before the call.
@@ -642,7 +642,7 @@ def integral_cotangents(
             value, who = at_stage(model, member_state, segment, history, o + i, j, asked, workspace, own, own_rows)
             turned = np.bool_(False)
             if bends and o + i != inside:
-                value, who, turned = one_sided(
+                value, who, turned = one_sided_limit(
                     model, member_state, segment, history, o + i, inside, j, who, value, mine, size, slopes, rows,
                     workspace, own, own_rows,
                 )  # fmt: skip

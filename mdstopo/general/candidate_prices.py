@@ -50,7 +50,7 @@ SCENE, CODE, FIRST_STATE, FIRST_ENERGY, LAST_STATE, FIRST_STEP, LAST_STEP, FROM_
 #: columns of `PricedCandidates.step`, and what a step may be
 FIRST_STAGE, LAST_STAGE, FIRST_NODE, KIND, MOVES = range(5)
 WHOLE, PART, POINT = range(3)
-#: fractions of a step at which a member that switches is looked at (Gauss and Lobatto), and the weights of these in the
+#: fractions of a step at which a member that switches is sampled (Gauss and Lobatto), and the weights of these in the
 #: polynomial through all
 NODES = 6
 _ROOTS = np.sort(np.polynomial.legendre.Legendre.basis(NODES - 1).deriv().roots())

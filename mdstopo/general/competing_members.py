@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 #: members that are followed at most, unless more rows than these are asked for
 FOLLOWED = 12
-#: members times places that are looked at in one pass over the motion, for the memory they take; more need a second
-#: pass, with those alone that come near the largest
+#: members times places at which forces are computed in one pass over the motion, for the memory they take; more need a
+#: second pass, with those alone that come near the largest
 AT_ONCE = 2**21
 #: error of the samples of a force, relative: they lie on the steps' quintic
 BESIDE = 0.02
@@ -35,7 +35,7 @@ def compete(kind: int, reduction: str) -> bool:
 def members_peaks(
     driver: "GeneralDriver", j: int, t: FloatArray, final: bool, window: float, most: int
 ) -> list[FloatArray]:
-    """The peaks of the members' forces that response j looks at, as rows of `extremes`.
+    """The peaks of the members' forces that response j is of, as rows of `extremes`.
 
     driver: with a finished run. j: the response.
     t (m + 1,): the steps' times (s).
@@ -140,7 +140,7 @@ def compare(
 
 
 def members_of(driver: "GeneralDriver", j: int) -> int:
-    """How many members the group has that response j looks at."""
+    """How many members the group has that response j is of."""
     block = driver.scene.model.block
     own = block[block[:, GROUP] == driver.scene.model.response[j, SUBJECT]]
     return int((own[:, OFFSET] + own[:, COUNT]).max())

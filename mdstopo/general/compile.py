@@ -47,7 +47,7 @@ class GeneralScene:
 
     load_case; model: the arrays; bodies: names in the order of the state, ground last; n_bodies: without it; damped:
     whether anything depends on velocity; skipped: what was left out, and why; redundant: joints with rows that others
-    imply; responses, reductions: what is looked at and how, objectives first, in the case's order; kinematics: how
+    imply; responses, reductions: what is evaluated and how, objectives first, in the case's order; kinematics: how
     bodies move; contacts: each in words.
     """
 
@@ -211,7 +211,7 @@ def _refuse_impacts(case: Case, load_case: LoadCase, bodies: Kinematics, made: D
 
 
 def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...]) -> None:
-    """A joint that others imply has no force of its own to look at (CaseError)."""
+    """A joint that others imply has no force of its own to evaluate (CaseError)."""
     mistakes = []
     for path, row in rows_of_responses(case):
         names = [each.joint for each in row.response.parts if each.joint in redundant]
@@ -352,7 +352,7 @@ def _responses(
     laws with those of expressions behind them. Responses that expressions are of stand behind the others.
 
     case, dimension, frames: the case, and what belongs to its dimension.
-    responses: what is looked at.
+    responses: of objectives and constraints.
     index: number of each body.
     curves: data of laws.
     """

@@ -53,7 +53,7 @@ def hold(
       row (COLUMNS,): the row, as of `extremes`.
       z (n,): the virtual displacement that solves the transposed system; no length: the system is asked for.
     In and out:
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
     Out:
       matrix (n + n_row, n + n_row), right (n + n_row,): the system, and (g_q, g_lam); where z has no length.
       out (N,): the gradient by alpha; where z has a length. padded (M_padded,): scratch for it.

@@ -175,7 +175,7 @@ def sample_response(
         coordinates, velocities and accelerations at both ends.
       rates: whether rates are wanted; else, where response j needs no balance, there may be no a and lam_out either.
       j: the response; below 0: none.
-      who: number of the member whose force is looked at; -1: at each place the one with the largest force.
+      who: number of the member whose force is meant; -1: at each place the one with the largest force.
       places (K, 2): steps, and fractions of them; 0 and 1 are the states at the ends as they are in that step.
     In place:
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.

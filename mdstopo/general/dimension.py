@@ -18,7 +18,7 @@ Pairs = dict[tuple[int, int], int]
 
 
 class JointRecord(Protocol):
-    """What is asked of a joint's kernels when a case is compiled.
+    """What the compiler of a case needs to know of a joint's kernels.
 
     rows: how many it has. steady: for each the slopes, as freedoms of either body, that are the same wherever bodies
     are.

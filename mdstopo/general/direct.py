@@ -156,7 +156,7 @@ def through_step(
       sets (slots, M_padded + P): derivatives of the permanent sets (`permanent_sets`).
       sets_bar (s, slots): cotangents of an integral by the sets at the stages; no rows where there is none.
     In and out:
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
       column (M_padded + P, 4 n + 1): derivatives of q, v and the two carried vectors; the last column sums up that of
         the integral.
     Out:
@@ -388,7 +388,7 @@ def push(
       first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
     In and out:
       room, room_ints: the history of steps; a partial step may come behind the others.
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
     Out:
       out (N + P,): the derivative by alpha, then by parameters. padded (M_padded + P,): scratch.
       work (WORK,): counts of work, added to.
@@ -626,7 +626,7 @@ def follow(
       with_alpha: whether derivatives by alpha are wanted; else they may mean nothing, and it takes much less time.
       first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
     In and out:
-      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets become those of the step in hand.
     Out:
       out (R, K, N + P + B): the derivatives by alpha, by parameters, by the B numbers. padded (M_padded + P + B,):
         scratch.

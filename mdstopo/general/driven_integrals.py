@@ -47,7 +47,7 @@ class Integrals(NamedTuple):
     twice: float
 
     def and_then(self, other: Integrals, length: float) -> Integrals:
-        """Both stretches one after the other; length: of the other one (s)."""
+        """The integrals over this stretch of time and the one behind it, which lasts `length` (s)."""
         return Integrals(self.once + other.once, self.twice + length * self.once + other.twice)
 
     def or_larger(self, other: Integrals) -> Integrals:

@@ -189,7 +189,7 @@ def first_dip(model, t, member_state, rel0, rel1, h, parts, watched):
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: time between them (s).
       parts: of how many parts of a step this is one, whose cubic the poses were taken from.
-      watched: the members and contacts that are looked at (`watch_near`).
+      watched: the members and contacts whose margins are checked (`watch_near`).
 
     Returns the earliest fraction at which a minimum is below zero, 2 where none is; the fraction of the lowest minimum
     that may be below zero in truth, 2 where there is none; its value, infinite where there is none.
@@ -264,7 +264,7 @@ def lowest_between(s0, d0, s1, d1):
 
 @kernel
 def probes_needed(model, rel0, rel1, watched):
-    """In how many parts a step is looked through: more where the bodies move far compared with a member's length.
+    """In how many parts a step is searched: more where the bodies move far compared with a member's length.
 
     The distance from a curved surface's centre or axis is to a contact what its length is to a member.
     """
@@ -301,7 +301,7 @@ def first_sign(model, t, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, wat
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: length of the step (s).
       noise: how far below zero a margin is by rounding alone (m).
-      watched: the members and contacts that are looked at (`watch_near`).
+      watched: the members and contacts whose margins are checked (`watch_near`).
 
     Returns the earliest fraction, or 2; and the fraction of the lowest margin that may be below zero in truth, or 2.
     """
@@ -348,7 +348,7 @@ def is_doubtful(model, t, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, wa
     rel0, rel1 (n_pair, POSE): relative poses at both ends.
     h: length of the step (s).
     noise: how far below zero a margin is by rounding alone (m).
-    watched: the members and contacts that are looked at (`watch_near`).
+    watched: the members and contacts whose margins are checked (`watch_near`).
     """
     dip, near = first_sign(model, t, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched)
     c = dip if dip < 1.0 else near

@@ -169,7 +169,7 @@ def _virtual(model, rel, p, z, out):
 def explicit_part(model, segment, j, who, slopes, t, member_state, q, v, a, scale, out):
     """What the design does to g_j at fixed motion, where g_j is the force f* of a member, or of such forces.
 
-    f* has a sign; its absolute value is what is looked at (`force_sign`).
+    f* has a sign; the response is its absolute value (`force_sign`).
 
     Constant:
       model: the compiled scene.

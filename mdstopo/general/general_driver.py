@@ -87,7 +87,7 @@ class GeneralDriver:
         self._model = model
         self._placing = Placing(case, scene.load_case, model) if case.variables else None
         self._packed = self.ints, self.floats = self.pack(model)
-        #: whether integrals over time are looked at
+        #: whether a response is integrated over time
         self._integrated = any(name in INTEGRALS for name in scene.reductions)
         self.settings = np.array(
             [options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS, float(self._integrated)]
@@ -236,7 +236,7 @@ class GeneralDriver:
             self._place()
 
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
-        """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
+        """Simulate alpha (N,) and evaluate all responses; `self.work` holds the counts of this call."""
         if self.rows.shape[1] != (rows.most or ROWS):
             self._make_rows(rows.most or ROWS)
         window = CLOSENESS if rows.window is None else rows.window
@@ -269,7 +269,7 @@ class GeneralDriver:
         )
 
     def _without_value(self, gradient: bool) -> tuple[Status, str]:
-        """Whether expressions that are looked at have values, and gradients where wanted; which has none, and when."""
+        """Whether expressions that are responses have values, and gradients where wanted; which has none, and when."""
         for j, response in enumerate(self.scene.responses):
             if not response.of:
                 continue
@@ -284,7 +284,7 @@ class GeneralDriver:
 
     @cached_property
     def _rotations(self) -> dict[tuple[str, str], IndexArray]:
-        """Numbers of observer and body, by their names, of rotations that are looked at before the end."""
+        """Numbers of observer and body, by their names, of rotations that are responses before the end."""
         bodies, found = self.scene.bodies, {}
         for response, reduction in zip(self.scene.responses, self.scene.reductions, strict=True):
             for each in response.parts:
@@ -368,7 +368,7 @@ class GeneralDriver:
 
     @cached_property
     def _plain_peaks(self) -> bool:
-        """Whether all that is looked at is one response by its peaks, and their derivatives are sweeps of their own."""
+        """Whether there is one response, of which peaks are meant, and their derivatives are sweeps of their own."""
         if len(self.scene.reductions) != 1 or self.start is not None:
             return False
         (reduction,), model = self.scene.reductions, self.scene.model
@@ -385,7 +385,7 @@ class GeneralDriver:
         return bool(differentiated)
 
     def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:
-        """What `peaks_vjp` takes."""
+        """All arguments of `peaks_vjp`."""
         both = PEAKS[self.scene.reductions[0]]
         return (
             *self.steps_arguments(count), 0, both, self.steps_are_fine, window, self.room, self.room_ints,
@@ -426,7 +426,7 @@ class GeneralDriver:
         sign: 1 for peaks of g, -1 for those of -g.
         window: how far below the highest sample a peak may be, relative to it.
         pieces (P, 4): what they are; no rows: the steps of the run.
-        who: of the steps the member whose force is looked at; -1: at each place the one with the largest.
+        who: of the steps the member whose force is meant; -1: at each place the one with the largest.
         plain (P,): 1 where the samples inside a piece are left out; None: nowhere.
         """
         plain = np.zeros(len(seen), dtype=np.int64) if plain is None else plain
@@ -452,8 +452,8 @@ class GeneralDriver:
         places (K, 2): steps and fractions of them.
         exact: whether states inside steps are the integrator's own, not those of the quintic through both ends.
         count: how many steps the run has.
-        steps: kept steps to look at instead of those of the last run.
-        who: the member whose force is looked at; -1: at each place the one with the largest.
+        steps: kept steps to evaluate instead of those of the last run.
+        who: the member whose force is meant; -1: at each place the one with the largest.
         rates: whether rates are wanted; without, they may be meaningless.
 
         Returns q (K, n_q) with v, a (2, K, n), multipliers (K, n_row + n_driven), and (K, 3) value, rate, member.
@@ -491,7 +491,7 @@ class GeneralDriver:
         return found
 
     def steps_arguments(self, count: int) -> tuple[Any, ...]:
-        """What every entry that differentiates begins with."""
+        """The first arguments of every entry that differentiates."""
         return self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count
 
     def _integral_with_gradient(self, j: int, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
@@ -605,7 +605,7 @@ class GeneralDriver:
         return self.start.settled if self.start is not None and self.settle(alpha) else None
 
     def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
-        """Gradients of what `evaluate` found by a method whose do not come with it; cones: tell `across`, too."""
+        """Gradients of what `evaluate` found, by a method that is no part of it; cones: tell `across`, too."""
         from mdstopo.general.methods import differentiate
 
         tell = cones and SENSITIVITIES[method].tells_norms and self._is_planar

@@ -1,7 +1,7 @@
 """Integrals over time of what has kinks: a norm that passes zero, the largest of several forces that changes hands.
 
 A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
-first looked at, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
+first sampled, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
 derivatives bend more sharply than values; for values see `quadrature_breakpoints`). The
 integrand is continuous there, so that its derivatives need no term of their own. They jump there, and at the end of a
 step beside a norm's zero they belong to a vector that all but vanishes: what the last stages of a long step are off by,

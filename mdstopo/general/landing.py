@@ -2,7 +2,7 @@
 
 That a member leaves its mode shows at the end of the step, or the cubic through both ends says where it might, come and
 go in between. Then four balances more make the polynomial, on which margins cost no balance: it is cut where something
-is doubtful, and both pieces are looked at in the same way, until nothing is. The root is bracketed and closed in on by
+is doubtful, and both pieces are checked in the same way, until nothing is. The root is bracketed and closed in on by
 secants, first beside the joints; at last it is corrected by what putting the state onto them changes. It is met to
 rounding, on its far side.
 """
@@ -73,7 +73,7 @@ def margin_inside(step, segment, t, h, c, watched, on_joints, q, v):
     step: the step (`Landing`); its `rel` and `push` are overwritten.
     segment: number of the stretch of time between two breakpoints.
     t, h, c: time at the start of the step, its length (s), and the fraction of it.
-    watched: the members and contacts that are looked at.
+    watched: the members and contacts whose margins are checked.
     on_joints: whether the state is put onto the joints.
     q (n_q,), v (n,): the state, out.
     """
@@ -207,7 +207,7 @@ def root_inside(step, segment, t, h, low, high, at_high, rounding, resolution):
 def used_before(step, segment, t, h, low, c, at_c, who, rounding):
     """Whether a margin is used up before a root, as one with a rate in it may be for a while only.
 
-    step: the step (`Landing`), all of whose watched members are looked at.
+    step: the step (`Landing`), all of whose watched members are checked.
     segment: number of the stretch of time between two breakpoints.
     t, h: time at the start of the step, and its length (s).
     low: a fraction of the step at which no margin is used up.
@@ -228,7 +228,7 @@ def used_before(step, segment, t, h, low, c, at_c, who, rounding):
 def on_joints(step, segment, t, h, low, c, value, who, rate, rounding, resolution):
     """Correct the moment of an event that has been found beside the joints: Newton's method between bounds.
 
-    step: the step (`Landing`), whose members `crossed` are looked at.
+    step: the step (`Landing`), whose members `crossed` are checked.
     segment: number of the stretch of time between two breakpoints.
     t, h: time at the start of the step, and its length (s).
     low: a fraction of the step at which no margin is used up.

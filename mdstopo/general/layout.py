@@ -207,7 +207,7 @@ def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tu
 
 
 def _first(links: set[tuple[int, int]], line: IndexArray) -> IndexArray:
-    """The first place that each row reaches, by the places of the rows."""
+    """For each place of a row in the matrix, the first place that it is linked to, at most its own: the skyline."""
     first = np.arange(len(line), dtype=np.int64)
     for r, s in links:
         low, high = sorted((int(line[r]), int(line[s])))

@@ -2,7 +2,7 @@
 
 In every step each member's force f*(t) is smooth. |f_a| = |f_b| where f_a - f_b or f_a + f_b vanishes: smooth functions
 both, whose roots are looked for between samples so near together that a cubic through values and rates tells all but
-the narrowest leads; where it does not tell, the motion itself is looked at. Only members come into question that may
+the narrowest leads; where it does not tell, the motion itself is sampled. Only members come into question that may
 lead between two samples by a bound on their cubics. Forces that are the same at all samples of a step (laws of time
 alone, actuators at their limit, symmetry) do not cross between them.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 #: samples of a step in which several members may lead
 FINE = np.linspace(0.0, 1.0, 17)
-#: forces looked at in one go, of all members at all samples
+#: forces computed in one go, of all members at all samples
 BATCH = 4_000_000
 #: a member whose cubic stays below the largest force by less than this share of it may lead in truth
 CLOSE = 1e-3
@@ -49,7 +49,7 @@ class Lead(NamedTuple):
 
 
 def leads(driver: "GeneralDriver", j: int, t: FloatArray) -> list[Lead]:
-    """Who carries the largest force that response j looks at, in order of time; t (m + 1,): the steps' times."""
+    """Who carries the largest force of response j, in order of time; t (m + 1,): the steps' times."""
     count, members = len(t) - 1, members_of(driver, j)
     found: list[Lead] = []
     if members == 1:
@@ -87,7 +87,7 @@ def _forces(
 ) -> tuple[FloatArray, FloatArray]:
     """Forces f* of some members and their rates, at the same fractions of several steps.
 
-    driver: of the load case; its last motion is looked at, on the quintics through the steps' ends.
+    driver: of the load case; its last motion is sampled, on the quintics through the steps' ends.
     j: the response, whose group the members belong to.
     count: number of steps.
     steps (W,): which steps.

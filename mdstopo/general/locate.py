@@ -1,7 +1,7 @@
-"""Where within a step a margin falls through zero: the next place to look at, and what it has shown.
+"""Where within a step a margin falls through zero: the next trial, and what it has shown.
 
 First it has to be known that one does: members that come and go within a step show it at neither end. Looking at the
-cubic through both ends tells where they might; there the step is cut, and both pieces are looked at in the same way,
+cubic through both ends tells where they might; there the step is cut, and both pieces are checked in the same way,
 until nothing is doubtful. Then the root is bracketed and closed in on. Each trial is a step of its own, a dozen sums of
 forces; so the first is where the quintic through both ends has the root, the second is put right by how far the margin
 there is from the quintic's, and further ones are secants of trials, which are near each other. Where that leads out of
@@ -82,7 +82,7 @@ def foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, c,
     t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
     ends_q (2, n_q), ends (2, 2, n): of the quintic.
     c: fraction of the piece.
-    watched: the members and contacts that are looked at (`events.watch_near`).
+    watched: the members and contacts whose margins are checked (`events.watch_near`).
     room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
     """
     quintic(model, c, high - low, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], room_q, room_v)
@@ -101,7 +101,7 @@ def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, watc
     segment: number of the stretch of time between two breakpoints.
     t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
     ends_q (2, n_q), ends (2, 2, n): of the quintic (`quintic_ends`).
-    watched: the members and contacts that are looked at (`events.watch_near`).
+    watched: the members and contacts whose margins are checked (`events.watch_near`).
     room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
 
     Returns a length of the step (s).
@@ -160,7 +160,7 @@ def foreseen_trial(
       trials (2, 2): length of the step (s) and smallest margin of the last trial and of the one before.
       tries: how many trials there have been.
       rounding: what rounding leaves of a margin.
-      watched: the members and contacts that are looked at (`events.watch_near`).
+      watched: the members and contacts whose margins are checked (`events.watch_near`).
     Out:
       room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
 

@@ -1,4 +1,4 @@
-"""What a method of integration does for those who look at its steps, chosen by its tag when a kernel is compiled.
+"""What a method of integration does for responses and sweeps, chosen by its tag when a kernel is compiled.
 
 The tag is a tuple of zeros whose length says which method is meant. A method has eight functions:
 

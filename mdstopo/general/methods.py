@@ -81,16 +81,16 @@ def _carried(
             if across is not None and driver.shapes[j] == "norm":
                 aims.append((True, across[j, r]))
             for integrated, factor, part in _summands(driver, j, rows[j, r], reduction):
-                for aside, out in aims:
+                for is_across, out in aims:
                     own = np.zeros(gradients.shape[2])
                     stopped = driver.entry.push(
-                        *driver.steps_arguments(count), j, integrated, sweeps, part, aside, driver.room,
+                        *driver.steps_arguments(count), j, integrated, sweeps, part, is_across, driver.room,
                         driver.room_ints, driver.member_state, driver.padded, own, driver.start_slopes(), driver.work,
                     )  # fmt: skip
                     if stopped >= 0:
                         message = FALLBACK.format(float(driver.states()[0][stopped]))
                         return by_direct(driver, alpha, looked, across)[0], message
-                    _add_since_settled(driver, j, part, aside, integrated, count, own)
+                    _add_since_settled(driver, j, part, is_across, integrated, count, own)
                     out += factor * own
             if reduction == "max_abs":
                 gradients[j, r] *= rows[j, r, SIGN]
@@ -98,19 +98,19 @@ def _carried(
 
 
 def _add_since_settled(
-    driver: "GeneralDriver", j: int, row: FloatArray, aside: bool, integral: int, count: int, out: FloatArray
+    driver: "GeneralDriver", j: int, row: FloatArray, is_across: bool, integral: int, count: int, out: FloatArray
 ) -> None:
     """What a displacement that counts from where the scene has settled has of that place's derivatives, out (N + P,).
 
     driver: of the motion that was differentiated. j, row: the response, and its row of `extremes`.
-    aside: whether the component across a norm's vector is meant.
+    is_across: whether the component across a norm's vector is meant.
     integral: 0 where the row is meant, 1 for the integral of the response, 2 for that of its square.
     count: how many steps the motion has.
     """
     if driver.start is None or j not in driver.start.since:
         return
     since = driver.start.since
-    pulled = since.integral_cotangent(j, integral, count) if integral else since.row_cotangent(j, row, aside, count)
+    pulled = since.integral_cotangent(j, integral, count) if integral else since.row_cotangent(j, row, is_across, count)
     driver.start.vjp(pulled, out)
 
 

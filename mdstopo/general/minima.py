@@ -51,7 +51,7 @@ class Pieces:
 
     On each, response j is smooth.
 
-    t (P + 1,): their times. With `evaluate_at` they are looked at as steps are.
+    t (P + 1,): their times. With `evaluate_at` they are evaluated as steps are.
     """
 
     def __init__(self, driver: "GeneralDriver", j: int, t: FloatArray) -> None:

@@ -35,7 +35,7 @@ from mdstopo.scene.model import (
 PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP, OFFSET, ROW = range(9)
 #: columns of `GeneralModel.joint`
 JOINT_CODE, JOINT_FIRST, JOINT_SECOND, JOINT_PAIR, JOINT_ROWS = range(5)
-#: columns of `GeneralModel.response`: what is looked at, body and reference, component, order in time, group or joint
+#: columns of `GeneralModel.response`: its kind, body and reference, component, order in time, group or joint
 KIND, BODY, REFERENCE, COMPONENT, ORDER, SUBJECT = range(6)
 #: columns of `GeneralModel.varied`: the block, the parameter's place in its law or the end that moves, which value,
 #: whether a time at an end, and the members (padded) from the first to the one behind the last

@@ -1,4 +1,4 @@
-"""Peaks of one response and their gradients in one call: what an evaluation of most designs asks for.
+"""Peaks of one response and their gradients in one call, which is all that most evaluations need.
 
 It is `peak_search.peaks_of_steps` and then `row_sweep.rows_vjp` of the rows that were found.
 """

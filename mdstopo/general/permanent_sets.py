@@ -80,7 +80,7 @@ from mdstopo.mechanics.laws.table import (
 
 @kernel
 def count_sets(model):
-    """How many members have a set; where there are none, nothing here is asked again."""
+    """How many members have a set; without any, no other function of this module is called."""
     total = 0
     for k in range(model.block.shape[0]):
         if law_remembers(model.block[k, CODE]):
@@ -304,7 +304,7 @@ def made_set(model, history, e):
 
 @kernel
 def time_back(model, history, e, pulled, bar):
-    """Add to bar (slots,), the cotangents of the sets, what they do to the time of event e.
+    """Add to bar (slots,), the cotangents of the sets, that of the time of event e, which depends on its member's set.
 
     pulled: derivative of the value that is differentiated by the time of the event (per s).
     """

@@ -110,7 +110,7 @@ def _switches(law: Law) -> bool:
 
 
 def _rows_of(driver: "GeneralDriver", factor: FloatArray) -> _Rows:
-    """What a driver has looked at, each part of it with its weight; factor (n_resp, R): of rows."""
+    """The rows that a driver has found, each part of it with its weight; factor (n_resp, R): of rows."""
     rows = [
         (row, factor[row.response, row.row] * sign_of(driver, row.response, row.row) * row.share)
         for row in wanted_rows(driver, False)

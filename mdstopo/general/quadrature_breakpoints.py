@@ -1,11 +1,11 @@
 """Where steps are to end for the sake of integrals: at kinks of what is integrated, and where it bends too sharply.
 
-The integral of a response is that of one more coordinate, by the weights of the stages, but no error control looks at
+The integral of a response is that of one more coordinate, by the weights of the stages, but no error control measures
 it. A norm or an absolute value has a complex singularity as near to the real axis as it comes to zero, however smooth
 the motion is; the nearer it is, the shorter steps beside it have to be. And a driven body, or one that hardly feels its
 members, takes steps in which a smooth response is no polynomial. So the weights' sum over each step is compared
 with a Gauss-Legendre sum, on the quintic through the step's ends, and steps are halved until both agree. What halves
-them is landed on; since steps are chosen anew in between, that is looked at once more. Fixed steps promise nothing, and
+them is landed on; since steps are chosen anew in between, that is checked once more. Fixed steps promise nothing, and
 stay.
 """
 

@@ -7,7 +7,7 @@ A kernel takes what it needs of the following, in any order, by these names:
                       space always three numbers for the point, then the others, vectors among them in the axes of
                       arrays (`spatial_scene`); of a displacement the others are what it counts from (`since_settled`)
     member_state, segment (`general.members`), the stretch of time between two breakpoints
-    who               of a response of members the member that is looked at
+    who               of a response of members the member that is meant
     t, q, v, a, lam   a state whose balance has just been made: time, coordinates, velocities, accelerations (n,),
                       multipliers (n_row,)
     workspace              what the balance has left (`general.accelerations`)

@@ -1,4 +1,4 @@
-"""What can be looked at in a general scene: g(q, v, a, lam, alpha) of Eq. 16, its slopes and its rate.
+"""Responses of a general scene: g(q, v, a, lam, alpha) of Eq. 16, its slopes and its rate.
 
 A response is evaluated at a state whose balance has just been made (`solve_accelerations`), so poses, forces,
 accelerations and multipliers are at hand. Of each kind there is a record, `ResponseKernels`; the branches by code are
@@ -991,7 +991,7 @@ def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, 
     near_q = np.empty(q.shape[0])
     near = np.empty((2, n))
     vector = np.empty(2)
-    aside = np.empty((2, 2))
+    nearby = np.empty((2, 2))
     solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
     _components(model.response[j, KIND], model, j, q, v, a, lam, vector)
     size = np.hypot(vector[0], vector[1])
@@ -1003,9 +1003,9 @@ def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, 
         e = apart if side == 1 else -apart
         beside(tag, model, history, k, c, e, q, v, here, near_q, near[0])
         solve_accelerations(model, member_state, segment, t + e, near_q, near[0], no, workspace, near[1], lam)
-        _components(model.response[j, KIND], model, j, near_q, near[0], near[1], lam, aside[side])
-    x = aside[1, 0] - aside[0, 0]
-    y = aside[1, 1] - aside[0, 1]
+        _components(model.response[j, KIND], model, j, near_q, near[0], near[1], lam, nearby[side])
+    x = nearby[1, 0] - nearby[0, 0]
+    y = nearby[1, 1] - nearby[0, 1]
     return (vector[0] * y - vector[1] * x) / (2.0 * apart * size)
 
 

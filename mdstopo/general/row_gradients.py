@@ -30,13 +30,13 @@ class _Block(NamedTuple):
 class WantedRow(NamedTuple):
     """A row of which a derivative is wanted, or a part of one.
 
-    response, row: numbers of what it belongs to. aside: 1 where the component across a norm's vector is meant, else 0.
-    share: of the derivative of that. at (COLUMNS,): the row that is differentiated (`extremes`).
+    response, row: numbers of what it belongs to. is_across: 1 where the component across a norm's vector is meant, else
+    0. share: of the derivative of that. at (COLUMNS,): the row that is differentiated (`extremes`).
     """
 
     response: int
     row: int
-    aside: int
+    is_across: int
     share: float
     at: FloatArray
 
@@ -45,12 +45,12 @@ def wanted_rows(driver: "GeneralDriver", across: bool) -> list[WantedRow]:
     """All that the derivatives of the rows that a driver has found are put together from, the latest first; without
     integrals, but for what jumps in them. across: what is across of norms, too."""
     wanted = [
-        WantedRow(j, r, aside, share, part)
+        WantedRow(j, r, is_across, share, part)
         for j, reduction in enumerate(driver.scene.reductions)
         if reduction not in INTEGRALS
         for r in range(driver.found.item(j))
         for share, part in parts(driver.rows[j, r])
-        for aside in range(2 if across and driver.shapes[j] == "norm" else 1)
+        for is_across in range(2 if across and driver.shapes[j] == "norm" else 1)
     ]
     wanted += [WantedRow(j, 0, 0, factor, row) for j, rows in driver.jumps.items() for factor, row in rows]
     if len(wanted) > 1:
@@ -59,7 +59,7 @@ def wanted_rows(driver: "GeneralDriver", across: bool) -> list[WantedRow]:
 
 
 def sign_of(driver: "GeneralDriver", j: int, r: int) -> float:
-    """The sign with which the derivative of what row r of response j looks at stands in that of the response."""
+    """The sign with which the derivative of the quantity in row r stands in that of response j."""
     return driver.rows.item(j, r, SIGN) if driver.scene.reductions[j] == "max_abs" else 1.0
 
 
@@ -80,16 +80,16 @@ class RowGradients:
         for first in range(0, len(wanted), most):
             part = wanted[first : first + most]
             block = self._block(len(part))
-            for m, (j, _, aside, _, row) in enumerate(part):
-                block.which[m] = j, aside
+            for m, (j, _, is_across, _, row) in enumerate(part):
+                block.which[m] = j, is_across
                 block.rows[m] = row
             driver.ready(f"pull_rows {len(part)}", driver.entry.rows_vjp, *self._arguments(count, block))
-            for (j, r, aside, share, row), own, start in zip(part, block.out, block.starts, strict=True):
+            for (j, r, is_across, share, row), own, start in zip(part, block.out, block.starts, strict=True):
                 if driver.start is not None:
                     if j in driver.start.since:
-                        start += driver.start.since.row_cotangent(j, row, bool(aside), count)
+                        start += driver.start.since.row_cotangent(j, row, bool(is_across), count)
                     driver.start.vjp(start, own)
-                if aside and across is not None:
+                if is_across and across is not None:
                     across[j, r] += share * own
                 elif (j, r) in begun or driver.scene.reductions[j] in INTEGRALS:
                     driver.gradients[j, r] += sign_of(driver, j, r) * share * own

@@ -254,7 +254,7 @@ class _AtRest:
         return null
 
     def _wide(self, u: Any) -> FloatArray:
-        """(n,): a step from its free part in scaled coordinates."""
+        """A step of all coordinates (n,), from that of the free ones in scaled coordinates; zero for the others."""
         wide = np.zeros(len(self.force))
         wide[self.free] = u / self._root
         return wide

@@ -79,7 +79,7 @@ class SinceSettled:
         return pulled
 
     def _components(self, j: int, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The displacement that response j looks at, along the observer's axes, and its slopes by q."""
+        """The displacement that response j measures, along the observer's axes, and its slopes by q."""
         from mdstopo.general.since_settled_entry import components
 
         d = self._driver

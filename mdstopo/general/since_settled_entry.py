@@ -15,7 +15,7 @@ from mdstopo.mechanics.kinematics.components import Z
 
 @part
 def _fill_components(model, j, q, none, bars, u, slopes):
-    """The displacement that response j looks at, less what it counts from, along the observer's axes.
+    """The displacement that response j measures, less what it counts from, along the observer's axes.
 
     Constant:
       model: the compiled scene.
@@ -37,7 +37,7 @@ def _fill_components(model, j, q, none, bars, u, slopes):
 
 @entry
 def components(ints, floats, j, q, u, slopes):
-    """The displacement that response j looks at, less what it counts from, along the observer's axes.
+    """The displacement that response j measures, less what it counts from, along the observer's axes.
 
     Constant:
       ints, floats: the packed scene (`pack_general`).

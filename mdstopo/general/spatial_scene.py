@@ -209,7 +209,7 @@ def _reaches(contact: FloatArray) -> FloatArray:
 
 
 class JointRows(NamedTuple):
-    """What is asked of a joint when a case is compiled (`dimension.JointRecord`)."""
+    """What the compiler of a case needs to know of a joint (`dimension.JointRecord`)."""
 
     rows: int
     steady: tuple[tuple[int, ...], ...]

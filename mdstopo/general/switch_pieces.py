@@ -124,7 +124,7 @@ def switched_integral(
 
 
 def _passed(driver: "GeneralDriver", j: int, pieces: "Pieces", b: int) -> tuple[float, int]:
-    """The margin that vanishes in front of piece b: its rate (per s), and what is asked for it as a member; 0: none.
+    """The margin that vanishes in front of piece b: its rate (per s), and the `who` that stands for it; 0: none.
 
     Of several it is the one that is nearest to zero in time.
     """

@@ -45,7 +45,7 @@ class Driver:
         options: the method, its tolerance or step, and the array that designs are put in.
         load_responses: imports the compiled entries that evaluate responses from the steps (`energy_responses`).
         reductions (n_obj,): codes of `sensitivity.reductions`, one an objective.
-        integrated: whether something is looked at that is integrated over time.
+        integrated: whether a response is integrated over time.
         """
         method, tolerance, step = options.method, options.tolerance, options.step
         self.scene = scene
@@ -128,7 +128,7 @@ class Driver:
         self._evaluate = {}
 
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
-        """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call.
+        """Simulate alpha (N,) and evaluate all objectives; `self.work` holds the counts of this call.
 
         Energies are no norms: `rows.cones` asks for nothing.
         """

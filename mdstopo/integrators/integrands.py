@@ -1,6 +1,6 @@
 """Where steps are to end for the sake of an integral over time of the stored energy.
 
-The integral is that of one more coordinate, by the weights of the stages, but no error control looks at it. Where the
+The integral is that of one more coordinate, by the weights of the stages, but no error control measures it. Where the
 motion feels the members, steps that are short enough for it are short enough for their energy. A body that is hardly
 slowed down passes by weak springs in a step or two, and their energy is no polynomial in it. So the energies of the
 stages, which are there, are written as a sum of Legendre polynomials: how fast its terms fall off tells what a rule of

@@ -54,7 +54,7 @@ class ResponseResult(NamedTuple):
     how many rows hold; gradients (n_obj, R, N); meeting: padded index of a member whose ends meet, or -1. grazing: of
     one that leaves no derivative, or -1. across: as gradients, of `evaluation.Peak.across`, where it was asked for;
     rows of responses without one are zero. unresolved: of a member whose stored energy has no digits, or -1. message:
-    who is to blame where a response cannot be looked at although the motion is right.
+    who is to blame where a response cannot be evaluated although the motion is right.
     """
 
     status: Status
@@ -149,13 +149,13 @@ class SceneDriver(Protocol):
     def room(self) -> FloatArray: ...
 
     def compile_responses(self) -> None:
-        """Have the machine code on the disk that looks at steps, without any steps."""
+        """Have the machine code that evaluates responses on the disk, without any steps."""
 
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate a design and evaluate all responses, and on demand their gradients by the discrete adjoint."""
 
     def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
-        """Gradients of what `evaluate` found by a method whose do not come with it; cones: tell `across`, too."""
+        """Gradients of what `evaluate` found, by a method that is no part of it; cones: tell `across`, too."""
 
     def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and the derivative (T, N) of response j at them, by `direct`."""
@@ -200,9 +200,9 @@ class DriverOptions:
     """What a driver is made for, beside its scene.
 
     method: the integrator. tolerance: relative error that objectives and gradients may have. step: fixed step (s); 0:
-    adaptive steps; negative: see `generalized_alpha.longest_step`. looked: what is looked at, objectives first. design
-    (N + P,): the array that every design is put in, shared with whoever gives designs. beside: another process that may
-    be compiling what evaluates responses.
+    adaptive steps; negative: see `generalized_alpha.longest_step`. looked: the responses, those of objectives first.
+    design (N + P,): the array that every design is put in, shared with whoever gives designs. beside: another process
+    that may be compiling what evaluates responses.
     """
 
     method: Method

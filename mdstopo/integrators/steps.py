@@ -121,7 +121,7 @@ ARRAYS = Fields(
 FIELDS = ARRAYS.names
 
 #: rad that the bodies of a pair may turn against each other in an adaptive step. The error of the motion does not see
-#: members that hardly move their bodies (a flywheel, a driven rotor); what is looked at does, and turns with them.
+#: members that hardly move their bodies (a flywheel, a driven rotor); responses do, and turn with them.
 TURN = 1.0
 
 #: share of the longest step so far in which an error of the velocity counts at least with what it moves. A step may
@@ -256,7 +256,7 @@ def add_preloads(model, strength, rel, out):
 
 @part
 def lasting(h, longest):
-    """How many times as far as in a step of length h an error of its velocity leads; longest: step so far."""
+    """The factor on the error of a step of length h, for an error of velocity that drifts on; longest: step so far."""
     return max(1.0, LASTING * longest / h)
 
 

@@ -71,7 +71,7 @@ def bound(case: Case, objective: Objective) -> Bound:
     where = _what(limits, forces.counted, _goal_words(objective))
     if not math.isfinite(least):
         return Bound(None, f"nothing keeps it from falling without end. {where}")
-    if not goal.one_sided and least <= 0.0:
+    if not goal.by_component and least <= 0.0:
         least = 0.0
         if not program.is_limited:
             text = f"without a limit on the {_others(objective)} nothing keeps it above 0"

@@ -211,7 +211,7 @@ def _limit_direction(
     # n . F >= 0 for both normals
     rows = -cone @ force.matrix
     known = force.known.mapped(-cone)
-    found.rows.append(Bounded(2, rows, known, 0.0, one_sided=True, words=f"members of {name}"))
+    found.rows.append(Bounded(2, rows, known, 0.0, by_component=True, words=f"members of {name}"))
     found.counted.append(f"members on {name} only pull, or only push, in directions known within its travel")
 
 
@@ -267,7 +267,7 @@ def travel(system: System, limits: Limits, name: str, other: str) -> float:
         if len(seen) == 2:
             radius = min(radius, row.radius)
         else:
-            strips.append((seen[0], -math.inf if row.one_sided else -row.radius, row.radius))
+            strips.append((seen[0], -math.inf if row.by_component else -row.radius, row.radius))
     for joint in system.case.joints:
         if joint.slide is not None and set(joint.bodies) == {name, other} and joint.bodies[0] in system.angles:
             axis = turned(joint.slide, system.angles[joint.bodies[0]])

@@ -132,7 +132,7 @@ class Program:
             values = row.known.at(grid[-1:], order)
         else:
             values = np.concatenate(row.known.at_ends(grid[:-1], grid[1:], order))
-        sizes = values.max(axis=1) if row.source.one_sided else np.sqrt((values**2).sum(axis=1))
+        sizes = values.max(axis=1) if row.source.by_component else np.sqrt((values**2).sum(axis=1))
         return float(sizes.max())
 
     def _reduce(self, row: Bounded, free: Floats) -> Reduced:

@@ -24,15 +24,15 @@ class Bounded:
     """At all times y(t) = (matrix X)(t), or its derivative of some order, is within a set.
 
     matrix (r, 2 n); known: r functions that are added (X_known is not in them). radius: of the set, or None where it is
-    what is minimised. one_sided: every component of y is at most the radius; else the norm of y is. final: only at the
-    end. until: only up to this time, None for always. words: what it is.
+    what is minimised. by_component: every component of y is at most the radius; else the norm of y is. final: only at
+    the end. until: only up to this time, None for always. words: what it is.
     """
 
     order: int
     matrix: Floats
     known: Cubics
     radius: float | None
-    one_sided: bool = False
+    by_component: bool = False
     final: bool = False
     until: float | None = None
     words: str = ""
@@ -77,7 +77,7 @@ def objective_row(system: System, objective: Objective) -> tuple[Bounded, float]
     row = replace(row, final=over == "final")
     if norm or over == "max_abs":
         return row, sign
-    return replace(row, one_sided=True, matrix=sign * row.matrix, known=_scaled(row.known, sign)), sign
+    return replace(row, by_component=True, matrix=sign * row.matrix, known=_scaled(row.known, sign)), sign
 
 
 def limits_of(system: System, constraints: tuple[object, ...]) -> Limits:
@@ -166,10 +166,10 @@ def _limit_rows(system: System, row: ResponseRow, turns: dict[str, float]) -> tu
     if above and (norm or over == "max_abs"):
         rows.append(replace(made, radius=row.bound + wider))
     elif above:
-        rows.append(replace(made, radius=row.bound + wider, one_sided=True))
+        rows.append(replace(made, radius=row.bound + wider, by_component=True))
     if below:
         turned = replace(made, matrix=-made.matrix, known=_scaled(made.known, -1.0))
-        rows.append(replace(turned, radius=-row.bound + wider, one_sided=True))
+        rows.append(replace(turned, radius=-row.bound + wider, by_component=True))
     return rows, remark
 
 

@@ -65,12 +65,12 @@ class Reduced:
     @property
     def round(self) -> bool:
         """Whether a norm in the plane is meant."""
-        return not self.source.one_sided and len(self.matrix) == 2
+        return not self.source.by_component and len(self.matrix) == 2
 
     def directions(self) -> Floats:
         """(d, r) normals of the half-planes asked for everywhere."""
         r = len(self.matrix)
-        if self.source.one_sided:
+        if self.source.by_component:
             return np.eye(r)
         if r == 1:
             return np.array([[1.0], [-1.0]])
@@ -140,7 +140,7 @@ class Solve:
 
     def _signed(self) -> bool:
         """Whether what is minimised may be negative."""
-        return any(row.source.one_sided for row in self.p.rows if row.radius is None)
+        return any(row.source.by_component for row in self.p.rows if row.radius is None)
 
     def _unit(self) -> float:
         return next(row.unit for row in self.p.rows if row.radius is None)
@@ -352,4 +352,4 @@ def zero_wide(n: int, k: int) -> csr_matrix:
 
 
 def _size(row: Reduced, y: Floats) -> Floats:
-    return np.asarray(y.max(axis=1) if row.source.one_sided else np.sqrt((y**2).sum(axis=1)))
+    return np.asarray(y.max(axis=1) if row.source.by_component else np.sqrt((y**2).sum(axis=1)))

@@ -106,7 +106,7 @@ def _gather_active(springs, strength, fill):
 
 @kernel
 def _count_chunks(counter, chunk, block, strength, count):
-    """Count the members that carry something in chunk after chunk, until none is left: what each thread does."""
+    """Count the active members, chunk after chunk, until none is left: the work of one thread."""
     i = taken(counter)
     while i < chunk.shape[0]:
         count[i] = _count(chunk[i, CHUNK_BLOCK], chunk[i, CHUNK_START], chunk[i, CHUNK_STOP], block, strength)
@@ -115,7 +115,7 @@ def _count_chunks(counter, chunk, block, strength, count):
 
 @kernel
 def _count(k, start, stop, block, strength):
-    """How many of the members in places start to stop of block k carry something."""
+    """How many of the members in places start to stop of block k are active."""
     s = strength[SCALED_STIFFNESS, start:stop]
     found = 0
     if block[k, KIND] == 0:
@@ -131,7 +131,7 @@ def _count(k, start, stop, block, strength):
 
 @kernel
 def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
-    """Copy the members that carry something of chunk after chunk, until none is left: what each thread does.
+    """Copy the active members, chunk after chunk, until none is left: the work of one thread.
 
     In:
       counter (1,): chunks that some thread has taken so far; counted on.
@@ -160,7 +160,7 @@ def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
 
 @kernel
 def _gather(k, start, stop, block, member, strength, begin, count, room):
-    """Copy those of the members in places start to stop of block k that carry something.
+    """Copy the active members in places start to stop of block k.
 
     In:
       k: number of the block.

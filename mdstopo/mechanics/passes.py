@@ -331,7 +331,7 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):
     Constant:
       model: the compiled scene.
     In:
-      stage (S or more, 3, n): q, v of the stages (m, rad; m/s, rad/s), and a vector that is not looked at.
+      stage (S or more, 3, n): q, v of the stages (m, rad; m/s, rad/s), and a vector that is not used.
       pose (any, n_pair, POSE): relative poses of the first stages, which are not found again.
       z (S, n): virtual displacements at the stages, the adjoint of the force balance.
       used (S,): 1 for the stages that count, 0 for the others.

@@ -89,6 +89,6 @@ def _stretched(t: Floats, power: float) -> Floats:
 
 
 def _sided(slopes: Floats, falling: Floats, rising: Floats) -> Floats:
-    """sum_i slope_i times the term of the side that the slope's sign asks for, (R,)."""
+    """sum_i slope_i times the term of the side that belongs to the slope's sign, (R,)."""
     down = np.einsum("ri,i->r", np.minimum(slopes, 0.0), falling)
     return np.asarray(down + np.einsum("ri,i->r", np.maximum(slopes, 0.0), rising))

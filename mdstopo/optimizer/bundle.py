@@ -151,7 +151,7 @@ class Bundle:
         if len(self) < 2:
             return self
         steepest, values = self.steepest, self.values()
-        # slopes that are the same have nearly the same sum: most pairs need no look at all their entries
+        # slopes that are the same have nearly the same sum: most pairs need not be compared entry by entry
         total = np.zeros(len(self)) if isinstance(self.slope, Stack) else np.einsum("rn->r", self.slope)
         near = self.group[:, None] == self.group
         near &= np.abs(values - values[:, None]) <= (SAME * np.maximum(steepest, 1e-300))[:, None]

@@ -69,7 +69,7 @@ def cuts_of(state: GsaoState, sample: Sample) -> tuple[Floats, Floats, bool]:
     newest tell what stood in the way.
 
     That were the highest rows there. Often they are none of the rows at the iterate: a peak that only rises on the way,
-    or one of more than are looked at. Linearised they tell the next subproblem, as the null steps of bundle methods do
+    or one of more than compete. Linearised they tell the next subproblem, as the null steps of bundle methods do
     (C. Lemarechal, 1975). No cut may say more of the iterate than its own value; of a function that is not convex it
     would, and then the box has to shrink.
     """

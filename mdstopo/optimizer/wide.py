@@ -27,7 +27,7 @@ from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
 from mdstopo.optimizer.wide_numbers import LIGHT, WIDE, steepest, stride, threads_for, total
-from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_look, wide_shift, wide_shift_few
+from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_shift, wide_shift_few, wide_steepest_and_sum
 from mdstopo.optimizer.wide_slots import COST, HIGH, LOW, SLOTS
 from mdstopo.settings.optimizer_presets import Settings
 
@@ -136,7 +136,7 @@ def _thin(n: int) -> Ints:
 
 
 class Measures:
-    """What is asked of designs and of gradients more than once: `largest_change`, `excess`, `steepest`."""
+    """Numbers of designs and gradients that are kept, because several steps need them: change, excess, steepest."""
 
     def __init__(self, space: Space) -> None:
         self.space = space
@@ -149,7 +149,7 @@ class Measures:
         """Find `steepest` of the gradients (R, N) and `excess` of x at once, where one pass can."""
         rows = self.space.rows
         if len(x) >= WIDE and gradients.shape == (1, len(x)) and gradients.flags.c_contiguous and len(rows) == 1:
-            most, total = wide_look(gradients[0], rows[0], x, threads_for(len(x), LIGHT))
+            most, total = wide_steepest_and_sum(gradients[0], rows[0], x, threads_for(len(x), LIGHT))
             self.steepest.tell(np.array([most]), gradients)
             self.excess.tell(total - self.space.linear.b, x)
 

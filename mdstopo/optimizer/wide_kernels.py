@@ -30,14 +30,14 @@ from mdstopo.optimizer.wide_slots import (
     root,
     settle,
 )
-from mdstopo.optimizer.wide_sorting import measure, one, sort_out
+from mdstopo.optimizer.wide_sorting import fix_by_bracket, measure, one
 
 #: variables of the sample from which the first bracket comes, and its half width in standard deviations: a wider one
 #: leaves more in doubt, a narrower one misses more often
 SAMPLE, SPREAD = 4096, 2.2
 #: what may be left of a sample's row, relative to what its variables can move, and to the half width
 ENOUGH, ENOUGH_OF_SPREAD = 1e-3, 0.1
-#: a sample that takes about every COARSER-th of those is looked at first, where it has at least FEWEST variables
+#: a sample that takes about every COARSER-th of those is solved first, where it has at least FEWEST variables
 FEWEST, COARSER = 128, 8
 #: by how much its bracket is widened, relative to the multiplier
 WIDER = 0.15
@@ -160,7 +160,7 @@ def wide_minimum(
     for attempt in range(ATTEMPTS):
         if attempt == ATTEMPTS - 1:
             near, far = least, BEYOND
-        n, total, size, change = sort_out(
+        n, total, size, change = fix_by_bracket(
             alpha, slope, cost, shift, lower, upper, limits, near, far, threads, out, slots, place, found, counts
         )
         ends = bracket_slots(slots, n, power, room, whole)

@@ -46,7 +46,10 @@ def total(a: Floats, x: Floats) -> float:
 
 
 def stride(n: int, sample: int) -> int:
-    """Every how many of n variables one is in a sample of about so many; no common factor: no grid's rhythm is met."""
+    """The distance of the variables that a sample of about so many of n takes.
+
+    It has no common factor with n, so that the sample does not keep step with rows of a grid.
+    """
     found = max(1, n // sample)
     while gcd(found, n) != 1:
         found += 1

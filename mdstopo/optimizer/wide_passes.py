@@ -174,7 +174,7 @@ def _sizes(counter: Ints, x: Floats, out: Floats) -> None:
 
 @vector_entry
 def wide_sum(a: Floats, x: Floats, threads: int) -> float:
-    """sum of a x, the same to the bit as `wide_look` finds it."""
+    """sum of a x, the same to the bit as `wide_steepest_and_sum` finds it."""
     sums = np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_sums, threads, (counter, a, x, sums))
@@ -191,17 +191,17 @@ def _sums(counter: Ints, a: Floats, x: Floats, out: Floats) -> None:
 
 
 @vector_entry
-def wide_look(gradient: Floats, a: Floats, x: Floats, threads: int) -> tuple[float, float]:
+def wide_steepest_and_sum(gradient: Floats, a: Floats, x: Floats, threads: int) -> tuple[float, float]:
     """max |gradient|, NaN where one is NaN, and the sum of a x."""
     most, sums = np.zeros(pieces(len(x))), np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
-    shared(_looks, threads, (counter, gradient, a, x, most, sums))
+    shared(_steepest_and_sums, threads, (counter, gradient, a, x, most, sums))
     return largest(most), _in_order(sums)
 
 
 @kernel
-def _looks(counter: Ints, gradient: Floats, a: Floats, x: Floats, most: Floats, sums: Floats) -> None:
-    """What `wide_look` does with the pieces of variables that this thread takes.
+def _steepest_and_sums(counter: Ints, gradient: Floats, a: Floats, x: Floats, most: Floats, sums: Floats) -> None:
+    """What `wide_steepest_and_sum` does with the pieces of variables that this thread takes.
 
     In:
       gradient (N,): of which the largest size is wanted.

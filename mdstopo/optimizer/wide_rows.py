@@ -44,10 +44,13 @@ class Pool:
         self._held: dict[int, tuple[Floats, bool] | None] = dict.fromkeys(range(ROWS))
 
     def places(self, arrays: list[tuple[Floats, bool]], unit: Floats) -> Ints:
-        """Where arrays (N,) are, (R,), those with True over the square of the ranges; others may go for them."""
+        """The rows of the pool (R,) that hold arrays (N,); of those with True, divided by the square of the ranges.
+
+        What is not held yet takes the place of what was longest not needed.
+        """
         keys = [(id(array), over) for array, over in arrays]
         for key in keys:
-            if key in self._where:  # it becomes the one last asked for
+            if key in self._where:  # it becomes the one last needed
                 self._held[self._where[key]] = self._held.pop(self._where[key])
         known = {self._where[key] for key in keys if key in self._where}
         oldest = [k for k in self._held if k not in known]
@@ -75,7 +78,7 @@ class Pool:
 
 
 class WideModel:
-    """What `competing_rows.RowModel` asks for, with very many variables.
+    """The interface `competing_rows.RowModel`, for very many variables.
 
     space: the problem's; measures: those of the driver.
     """

@@ -33,7 +33,7 @@ def one(x: Floats, n: int, i: int) -> float:
 
 
 @kernel
-def sort_out(
+def fix_by_bracket(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
     near: float, far: float, threads: int, out: Floats, slots: Floats, place: Ints, found: Ints, counts: Ints,
 ) -> tuple[int, float, float, float]:  # fmt: skip
@@ -86,7 +86,7 @@ def _sort_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
     limits: Floats, near: float, far: float, out: Floats, found: Ints, sums: Floats, counts: Ints,
 ) -> None:  # fmt: skip
-    """What `sort_out` does with the pieces of variables that this thread takes, before there are slots.
+    """What `fix_by_bracket` does with the pieces of variables that this thread takes, before there are slots.
 
     Constant:
       slope (N,): the row's gradient at the iterate.
@@ -142,7 +142,7 @@ def _moving(
     Returns how many do not rest.
     """
     n = len(c) // lanes() * lanes()
-    count: int = np.int64(0)  # type: ignore[assignment]  # as in `sort_out`
+    count: int = np.int64(0)  # type: ignore[assignment]  # as in `fix_by_bracket`
     sums[0], sums[1], sums[2] = 0.0, 0.0, 0.0
     for start in range(0, n, RUN):
         held, weight = zero(), zero()

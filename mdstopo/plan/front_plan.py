@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from mdstopo.optimizer.scalarisation import Scalarisation, formula_of
 from mdstopo.optimizer.start_families import Family, begins_at_best, family_of
 from mdstopo.plan.front_measures import dominated
-from mdstopo.plan.race import Solved, race, rivals
+from mdstopo.plan.race import Solved, in_contest, race
 from mdstopo.plan.solve_task import Found, Result, Task
 from mdstopo.plan.visited import Place, Visited, belonging, even_spacing
 from mdstopo.settings.scalarisations import SCALARISATIONS, SUM
@@ -164,7 +164,7 @@ class Planner:
         starts = self.request.starts
         early = starts.early
         alone = {i: Task(-1 - i, self._alone(i), starts.first, self.request.iterations) for i in self.active}
-        contests = [rivals([starts.begin(alone[i], k, k) for k in range(1, early)]) for i in self.active]
+        contests = [in_contest([starts.begin(alone[i], k, k) for k in range(1, early)]) for i in self.active]
         solved = yield from self._solve(self._new(list(alone.values())), contests)
         self._choose_ends([found for _, found in solved])
         crossed = [
@@ -201,7 +201,7 @@ class Planner:
             return []
         task = self._task(j, starts.first)
         best = self.known[self._best_of(self._values(j, self.table), self.beyond)].alpha
-        return rivals([starts.begin(task, k, k + starts.count * (1 + j), best) for k in range(1, starts.count)])
+        return in_contest([starts.begin(task, k, k + starts.count * (1 + j), best) for k in range(1, starts.count)])
 
     def _exchange(self) -> Part:
         for _ in range(EXCHANGES):
@@ -370,7 +370,7 @@ class Planner:
         return Scalarisation(SUM, np.eye(self.m)[i])
 
     def _vertex(self, j: int) -> int:
-        """The objective that point j asks for alone, or -1."""
+        """The objective of which point j is the optimum alone, or -1."""
         places = np.flatnonzero(self.request.directions[j] > 0.0)
         return int(places[0]) if len(places) == 1 else -1
 

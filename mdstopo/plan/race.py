@@ -19,20 +19,22 @@ from mdstopo.starts.quotas import QUOTAS, drop
 Solved = list[tuple[Task, Found]]
 
 
-def rivals(tasks: Sequence[Task]) -> list[Task]:
-    """Tasks of one solve that compete with each other."""
+def in_contest(tasks: Sequence[Task]) -> list[Task]:
+    """Starts of one solve, as tasks that compete with each other."""
     if len(tasks) < 2:
         return list(tasks)
     digest = hashlib.blake2b(digest_size=16)
     for task in tasks:
         digest.update(np.ascontiguousarray(task.start).tobytes() + bytes([task.softened]))
-    return [replace(task, rivals=digest.hexdigest()) for task in tasks]
+    return [replace(task, contest=digest.hexdigest()) for task in tasks]
 
 
 def race(
     alone: Sequence[Task], contests: Sequence[Sequence[Task]], tolerance: float
 ) -> Generator[list[Task], list[Result], Solved]:
-    """Solve tasks that stand alone, and the contests' (`rivals`), in quotas; yields tasks, is sent their results.
+    """Solve tasks that stand alone, and those that compete (`in_contest`), in quotas; yields
+    tasks, is
+    sent their results.
 
     A result is a state where the task has a quota, or what was found where an earlier process has ended it.
     """

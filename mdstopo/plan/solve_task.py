@@ -40,8 +40,8 @@ class Task:
     """point: which point of the front it is for, or -1 - i for the optimum of objective i alone.
 
     start (n,): the optimiser's x to begin with; softened: the optimum from there with less strong members is, in its
-    place. iterations: at most so many. rivals: the hash of the starts that it competes with, for who goes on depends on
-    them all; empty where it competes with none. iterate: the design that is evaluated in this iteration is what is
+    place. iterations: at most so many. contest: the hash of the starts that it competes with, for who goes on depends
+    on them all; empty where it competes with none. iterate: the design that is evaluated in this iteration is what is
     found; -1: the best of all. begun: the optimiser's state where an earlier process, or an earlier part, left the
     task; quota: iterations after which it is left again, None: it goes on to its end. What is found does not depend on
     these two.
@@ -52,7 +52,7 @@ class Task:
     start: Floats
     iterations: int
     softened: bool = False
-    rivals: str = ""
+    contest: str = ""
     iterate: int = -1
     begun: State | None = None
     quota: int | None = None
@@ -62,7 +62,7 @@ class Task:
         digest = hashlib.blake2b(digest_size=16)
         one = self.scalarisation
         words = [case_key, self.point, one.method, one.exponent, self.iterations]
-        digest.update(json.dumps([*words, self.softened, self.rivals, self.iterate]).encode())
+        digest.update(json.dumps([*words, self.softened, self.contest, self.iterate]).encode())
         for array in (one.weights, one.lowest, one.highest, one.anchor, one.normal, one.planes, self.start):
             digest.update(b"-" if array is None else np.ascontiguousarray(array, dtype=np.float64).tobytes() + b"|")
         return digest.hexdigest()
@@ -122,7 +122,7 @@ def front_key(case: Case) -> str:
 
 
 def failed(point: int, key: str, alpha: Floats, m: int, reason: str) -> Found:
-    """What stands for a task that came to nothing."""
+    """The result of a task that failed."""
     nothing = np.full(m, np.nan)
     return Found(
         point, key, alpha, nothing, float("nan"), RunStatus.FAILED, reason, 0, float("nan"), float("nan"),
@@ -233,7 +233,7 @@ def _priced(
 
 
 def _is_there(task: Task, state: State) -> bool:
-    """Whether a state is as far as it is asked for: the end of the task or of its part, or just before the iterate."""
+    """Whether a state has come to the end of the task or of its part, or just before the iterate that is wanted."""
     return task.is_through(state) or (task.iterate >= 0 and state.iteration >= task.iterate - 1)
 
 
@@ -281,7 +281,7 @@ def _end(engine: Engine, case: Case, task: Task, key: str, state: State) -> Foun
 
 
 def _iterate(engine: Engine, case: Case, task: Task, key: str, state: State) -> Found:
-    """The design that is evaluated in the iteration that is asked for; state: before it, or the first one."""
+    """The design that is evaluated in the iteration that the task names; state: before it, or the first one."""
     alpha = state.trial if task.iterate > 0 else state.alpha
     objectives, excess = _final(engine, case, alpha)
     return Found(

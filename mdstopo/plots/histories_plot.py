@@ -1,4 +1,4 @@
-"""What the objectives look at, over time; on demand sensitivities over time."""
+"""The responses of objectives, over time; on demand sensitivities over time."""
 
 from textwrap import fill
 from typing import Any

@@ -30,7 +30,7 @@ PLOTS: dict[str, Plot] = {
     "convergence": Plot(("convergence", "draw"), "objectives over the iterations"),
     "design": Plot(("design", "draw"), "alpha of every member"),
     "sensitivities": Plot(("sensitivities", "draw"), "dG/dalpha of every member", ("members",)),
-    "histories": Plot(("histories", "draw"), "what the objectives look at, over time", ("load_case",)),
+    "histories": Plot(("histories", "draw"), "the responses of objectives, over time", ("load_case",)),
     "sensitivity-histories": Plot(
         ("histories", "draw_sensitivities"), "dg/dalpha over time, from `gradient --history`", ("members",)
     ),

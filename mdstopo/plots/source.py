@@ -44,7 +44,7 @@ class Source:
 
     @cached_property
     def stated(self) -> Case:
-        """The case as it was read, with what --set changed; of a fit the fitted one, looking at what was measured."""
+        """The case as it was read, with what --set changed; of a fit the fitted one, with what was measured."""
         case = case_of(self.view)
         if self.view.kind != "fit":
             return case

@@ -13,7 +13,7 @@ from mdstopo.scene.points import points_at
 
 #: of the largest: what is smaller has no arrow
 TINY = 1e-6
-#: times at which a load that is a formula is looked at for its largest value
+#: times at which a load that is a formula is sampled for its largest value
 SAMPLES = 201
 #: kinds that change with time
 LOADS = ("load", "moment")

@@ -1,4 +1,4 @@
-"""From where a scene in space is looked at: three views along the axes, and perspective."""
+"""From where a scene in space is drawn: three views along the axes, and perspective."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What every objective looks at, over time: for pictures and tables, not for the optimiser."""
+"""The response of every objective, over time: for pictures and tables, not for the optimiser."""
 
 from typing import TYPE_CHECKING
 

@@ -33,7 +33,8 @@ class Pair:
 
 @dataclass(frozen=True)
 class Designs:
-    """Members of both: how many in both, changed, there only in one; only_first, only_second: no members of the other.
+    """Two designs, member by member: how many both have, how many of these changed, appeared, vanished; only_first,
+    only_second: how many the other case has not.
 
     largest: the largest change of alpha, and whose it is.
     """

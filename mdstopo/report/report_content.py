@@ -113,7 +113,7 @@ def _bounds(source: Source) -> dict[str, dict[str, Any]]:
 
 
 def _what(case: Case, name: str) -> str:
-    """What an objective looks at, and its measure in an uncertain case; what is shown over time is the nominal case."""
+    """The response of an objective, and its measure in an uncertain case; courses over time are of the nominal case."""
     what = words(_objective(case, name).response)
     return what if case.uncertainty is None else f"{what}, {case.uncertainty.objectives[name].words}"
 

@@ -156,7 +156,7 @@ class _Handler(BaseHTTPRequestHandler):
         super().__init__(*given)
 
     def do_GET(self) -> None:
-        """One of the three; nothing for a page of somebody else that asks this computer."""
+        """Send one of the three pages; nothing where the request comes from a page of another site."""
         host = (self.headers.get("Host") or "").rpartition(":")[0] or self.headers.get("Host", "")
         if host not in (HOST, "localhost"):
             self._send(HTTPStatus.FORBIDDEN, "text/plain", f"ask for http://{HOST}")

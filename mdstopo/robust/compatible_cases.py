@@ -73,7 +73,7 @@ def _limited(row: VolumeRow | ResponseRow) -> tuple[object, ...]:
 
 
 def _seen(response: Response) -> tuple[object, ...]:
-    """A response but for where on its body it is looked at."""
+    """A response without the place of its point on the body."""
     of = response
     parts = tuple((name, _seen(each)) for name, each in of.of)
     return of.kind, of.body, of.relative_to, of.component, of.group, of.joint, of.since, of.formula, parts

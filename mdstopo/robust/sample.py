@@ -48,7 +48,7 @@ def design_sample(uncertainty: Uncertainty) -> Sample:
 
 
 def check_sample(uncertainty: Uncertainty) -> Sample | None:
-    """The fresh sample for the end; None where none is asked for, or nothing is left to sample."""
+    """The fresh sample for the end; None where the case has none, or no number varies."""
     n = uncertainty.validation
     if not n or not uncertainty.numbers:
         return None

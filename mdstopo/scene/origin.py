@@ -1,6 +1,6 @@
 """A scene that stands far from the origin, moved close to it before it is compiled.
 
-Nothing that is looked at depends on where a scene stands, but digits do. Elongations come from displacements, which
+No response depends on where a scene stands, but digits do. Elongations come from displacements, which
 know no origin; but directions, contacts and what joints leave come from coordinates, of which 1e6 m leave 1e-10 m, and
 a member that is tied to `ground` has an arm of 1e6 m, whose square stands in the moments' derivatives. So a scene is
 compiled in coordinates from a point of its own, and places are told in the file's (`Trajectory`).

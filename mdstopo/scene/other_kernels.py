@@ -1,4 +1,4 @@
-"""Kernels of other distributions that a case needs, made known to the store of machine code before it is asked."""
+"""Kernels of other distributions that a case needs: the store of machine code has to know them before it loads any."""
 
 import importlib
 

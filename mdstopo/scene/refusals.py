@@ -88,7 +88,7 @@ def rows_of_responses(case: Case) -> Iterator[tuple[str, Objective | ResponseRow
 
 
 def _responses(case: Case) -> Iterator[tuple[str, Response]]:
-    """All responses of a case, with the key path of what asks for them."""
+    """All responses of a case, with the key path of the objective or constraint that has them."""
     yield from ((path, row.response) for path, row in rows_of_responses(case))
     if case.fit is not None:
         yield from ((f"fit.measured.{each.name}", each.response) for each in case.fit.series)

@@ -1,6 +1,6 @@
 """The exact gradient of the discretised objective: one reverse sweep over the steps, one pass over the members.
 
-The sweep starts at the step that holds the looked-at time (or spreads over all stages, for integrals), pulls the
+The sweep starts at the step that holds the time of the row (or spreads over all stages, for integrals), pulls the
 cotangents of the state back step by step at body level, and keeps the virtual displacement z of every stage's force
 balance. Then dG/dalpha_i = dg/dalpha_i - mu alpha_i^(mu-1) sum_s f_i (b_i . T z_s): one pass, members outside, stages
 inside. The peak's time is held fixed (envelope theorem).

@@ -1,4 +1,4 @@
-"""A pass over the candidates of a group, whoever computes their prices: what all of it finds, and which are the best.
+"""A pass over the candidates of a group, with any function that prices them: totals, and the best candidates.
 
 Prices are computed by compiled entries that keep a few numbers of each tile of TALL by BROAD points, and those of
 single candidates (`sensitivity.pricing`, `general.pricing`).
@@ -28,7 +28,7 @@ from mdstopo.sensitivity.candidate_prices import (
     WORTH,
 )
 
-#: tiles of which all candidates are looked at, of those with the largest gains
+#: tiles of which all candidates are priced one by one, of those with the largest gains
 TILES = 64
 #: of a tile, how many are told before any is of which so many are told already
 SHARE = 8
@@ -133,7 +133,7 @@ class CandidatePass(ABC, Generic[A]):
         return begin, (a % TALL * BROAD + b % BROAD)[order].astype(np.int64)
 
     def _built_here(self) -> tuple[IndexArray, IndexArray]:
-        """The members whose points are among those that are looked at, by the places of these there."""
+        """The members whose points are among those of the tile, by the places of these there."""
         found = [np.searchsorted(chosen, index) for chosen, index in zip(self.chosen, self._built, strict=True)]
         inside = np.ones(len(self._built[0]), dtype=np.bool_)
         for place, chosen, index in zip(found, self.chosen, self._built, strict=True):
@@ -141,7 +141,7 @@ class CandidatePass(ABC, Generic[A]):
         return found[0][inside], found[1][inside]
 
     def _of_tile(self, states: A, tile: int, worth: float) -> tuple[IndexArray, IndexArray, IndexArray, FloatArray]:
-        """Of all candidates of a tile that may enter: the places of their points among those that are looked at, their
+        """Of all candidates of a tile that may enter: the places of their points among those of the tile, their
         ranks in the tile, and their gains."""
         rows, columns = self.chosen
         width = len(columns)

@@ -1,9 +1,9 @@
 """The prices of members that are not built: what the objective would change by with a little of each.
 
-A member adds to the gradient a sum over stages and looked-at states that knows of the motion only the relative poses of
-its two bodies and their virtual changes (`passes.design_gradient`). These are few numbers: `row_poses` finds them for a
-weighted sum of rows. Then `price_candidates` goes through all candidates of two grids of points, tile by tile, and
-keeps a few numbers a tile; `price_members` gives the prices of single ones. Nothing is kept a candidate.
+A member adds to the gradient a sum over stages and the states of rows that knows of the motion only the relative poses
+of its two bodies and their virtual changes (`passes.design_gradient`). These are few numbers: `row_poses` finds them
+for a weighted sum of rows. Then `price_candidates` goes through all candidates of two grids of points, tile by tile,
+and keeps a few numbers a tile; `price_members` gives the prices of single ones. Nothing is kept a candidate.
 """
 
 import math

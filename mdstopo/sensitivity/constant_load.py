@@ -95,7 +95,7 @@ def _gradient(ints, floats, alpha, weights, states, z, padded, out):
 def constant_load(packed: Packed, alpha: FloatArray, poses: FloatArray, weights: FloatArray) -> FloatArray:
     """Gradient (N,) of sum_p weights_p g(q_p) with respect to alpha (N,), by constant dynamic loading.
 
-    packed: the scene. poses (P, n): q at the looked-at time (P = 1, weight 1), or at the nodes of a mean or integral
+    packed: the scene. poses (P, n): q at the time of the row (P = 1, weight 1), or at the nodes of a mean or integral
     with their weights (P,).
     """
     count, n = poses.shape

@@ -118,11 +118,11 @@ def evaluate_responses(
 def find_meeting(model, strength, steps, count, pose, settings, meeting):
     """Find a member whose ends meet while it carries a force: its direction and its force are lost there.
 
-    A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
+    A pair that moves by some distance shortens no member by more. So lengths are computed only where the motion since
     they were last known could have used up the shortest, and single members only where it could have done so within
     one stretch between stages.
 
-    Between the last node of a collocation window and the first of the next no force is looked at. A member that turns
+    Between the last node of a collocation window and the first of the next no force is computed. A member that turns
     round there unseen, and by whose force that matters to UNSEEN tolerances, counts as one that meets.
 
     Constant:

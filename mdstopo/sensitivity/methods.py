@@ -29,7 +29,7 @@ FALLBACK = "the sweeps of the iterative method do not contract at t = {:.6g} s; 
 
 
 def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: ResponseResult) -> Differentiated:
-    """Gradients of the rows that `driver.evaluate(alpha, ...)` found, by a method whose do not come with the values.
+    """Gradients of the rows that `driver.evaluate(alpha, ...)` found, by a method that is no part of that call.
 
     alpha: (N,). Counts are added to `driver.work`. Raises ValueError for any other name, and for a method that is not
     defined on the integrator's steps.

@@ -33,7 +33,7 @@ class SpringsDriver(Driver):
         self._diagnosis = Diagnosis(case, scene)
 
     def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
-        """Gradients of what `evaluate` found; energies are no norms: `cones` asks for nothing."""
+        """Gradients of what `evaluate` found; energies are no norms, so `cones` changes nothing."""
         from mdstopo.sensitivity.methods import differentiate
 
         return differentiate(method, self, alpha, looked)
@@ -45,7 +45,7 @@ class SpringsDriver(Driver):
         return histories(self, alpha)
 
     def response_history(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
-        """(n_resp, T): the stored energy of a design at times (T,), for each objective that looks at it."""
+        """(n_resp, T): the stored energy of a design at times (T,), for each objective that is of it."""
         from mdstopo.responses.stored_energy import stored_energy
 
         energy = stored_energy(self.case, alpha, self.simulate(alpha)[1].at(times)[0] + self._home)

@@ -300,7 +300,7 @@ class SizeSearch:
         return np.array([int(np.abs(sizes - x[place]).argmin()) for place, sizes in pairs], dtype=np.int64)
 
     def _try_near(self, node: Node, x: Floats, slope: Floats) -> None:
-        """Try the nearest sizes, made to keep the rows by what costs least, and then what else there is room for."""
+        """Try the nearest sizes, with the cheapest changes until the rows hold, then with what these still allow."""
         choice = np.clip(self._nearest(x), node.low, node.high)
         gains = slope[self._catalogued.place]
         if not self._repair(choice, x, gains):
@@ -357,7 +357,7 @@ class SizeSearch:
         return np.asarray(miss - ROWS * size)
 
     def _try(self, choice: Ints, x: Floats) -> bool:
-        """Evaluate a choice, with what else varies at its best; whether it is better than the best so far."""
+        """Evaluate a choice of sizes, all other variables at their optimum; whether it is the best so far."""
         key = tuple(choice.tolist())
         if key in self._known or self._excess(choice, x) > 0.0:
             return False

@@ -2,7 +2,7 @@
 
 
 def ignore(_: object) -> None:
-    """Take something and do nothing with it."""
+    """A callback that does nothing."""
 
 
 def ignore_state(_index: int, _state: object) -> None:

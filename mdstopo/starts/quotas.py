@@ -47,7 +47,7 @@ States = list[State | None]
 
 
 def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> Iterator[list[StartTask]]:
-    """What every start does next, round by round; `states` are to be up to date when the next round is asked for."""
+    """What every start does next, round by round; `states` are to be up to date when the next round is taken."""
     count = len(states)
     families = [family_of(index, count, case.n_design > 0) for index in range(count)]
     if count == 1 or stage_count(case) > 1:
@@ -84,7 +84,7 @@ def all_found(states: Sequence[State | None]) -> bool:
 
 def came_to(states: Sequence[State | None]) -> tuple[int, int]:
     """How many starts had come to an optimum at the first quota, or were on their way to one, and to how many distinct
-    ones; the same whenever it is asked from then on."""
+    ones; the same at any later time."""
 
     def is_known(index: int) -> bool:
         state = states[index]

@@ -30,7 +30,7 @@ Stop = Callable[[], bool]
 
 
 def make_optimizer(case: Case, problem: Problem, family: Family = Family.STATED) -> Optimizer:
-    """The optimiser that the case asks for, with the first steps of a family of starts."""
+    """The optimiser of the case, with the first steps of a family of starts."""
     chosen = case.optimizer
     own = {"trust_start": LONG_FIRST_STEPS} if family is Family.RANDOM else {}
     return make(

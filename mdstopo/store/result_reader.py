@@ -1,4 +1,4 @@
-"""Result files, read back: what `show`, `--alpha` and resuming look at."""
+"""Result files, read back: what `show`, `--alpha` and resuming read."""
 
 import json
 import os
@@ -153,7 +153,7 @@ def _sealed(path: Path) -> Seal:
 
 
 def _open_at_once(path: str, flags: int) -> int:
-    """As `open` does, without waiting for whoever writes to a pipe."""
+    """Open a file as `open` does; a pipe, too, without waiting for its writer."""
     return os.open(path, flags | os.O_NONBLOCK)
 
 

@@ -1,4 +1,4 @@
-"""What is looked at in a result file, which may come from anybody.
+"""What is read of a result file, which may come from anybody.
 
 Only the names that this program gives, reached by plain links, each once; only data that lie in the file itself, as
 they are, so that nothing read is larger than the file. Other HDF5 (links to other places, compressed, virtual and
@@ -18,7 +18,7 @@ from mdstopo.store.store_errors import DamagedError
 Array = NDArray[np.generic]
 Texts = dict[str, str | tuple[str, ...]]
 
-#: what stands at the top of a file; others are none of ours and are not looked at
+#: what stands at the top of a file; others are none of ours and are not read
 _KNOWN = frozenset(
     {
         "candidates",

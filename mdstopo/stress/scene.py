@@ -42,7 +42,7 @@ class Scene:
 
     @property
     def integrator(self) -> str:
-        """The integrator that the case asks for."""
+        """The integrator of the case."""
         return str(self.data.get("solver", {}).get("integrator", "auto"))
 
     @property

@@ -41,7 +41,7 @@ def open_scenes(_: object) -> Perform:
 
 
 class Watch:
-    """Computes scenes one after another; a context manager, because a process belongs to it. setup: what it does."""
+    """Computes scenes in another process, which ends with this context manager. setup: called once in that process."""
 
     def __init__(self, setup: Setup = open_scenes) -> None:
         self._compiling = 0.0 if compiled() else COMPILING

@@ -153,7 +153,7 @@ def _closed_errors(case: "Case") -> float:
 
 
 def scenes() -> list[Scene]:
-    """Each on the integrators that carry contacts."""
+    """The scenes, each with every integrator that carries contacts."""
     found = []
     for integrator in GENERAL:
         tag = integrator.replace("_", "-")

@@ -77,7 +77,7 @@ def _tied(count: int, case: "Case") -> float:
 
 
 def twins(**solver: Any) -> dict[str, Any]:
-    """Two bodies that do the same on members of their own; looked at: the largest force in a member."""
+    """Two bodies that do the same on members of their own; the response is the largest force in a member."""
     return {
         "time": {"end": 0.5},
         "bodies": {"one": ball(1.0), "other": ball(1.0)},
@@ -169,7 +169,7 @@ def _zero_response(case: "Case") -> float:
 
 
 def resting(**solver: Any) -> dict[str, Any]:
-    """A body at rest, looked at in every way."""
+    """A body at rest, with every way to reduce a response."""
     of = {"body": "ball"}
     looked: dict[str, Any] = {
         name: {"response": {name: of}, "over_time": over}

@@ -22,7 +22,7 @@ def peak(rate: float) -> float:
 
 
 def pulled(rate: float, when: tuple[float, ...] = (WHEN,), **solver: Any) -> dict[str, Any]:
-    """A body at rest, 3 m from ground, that members pull at once or one after another; looked at: its speed."""
+    """A body at rest, 3 m from ground, that members pull at once or one after another; the response is its speed."""
     law = {"type": "pulse", "peak": peak(rate), "rate": rate}
     return {
         "time": {"end": 1.0},
@@ -55,7 +55,7 @@ def _speed(rate: float, when: tuple[float, ...], case: "Case") -> float:
 
 
 def struck(rate: float, **solver: Any) -> dict[str, Any]:
-    """As `pulled`, with a spring of 400 N/m beside the pulse; looked at: the largest acceleration."""
+    """As `pulled`, with a spring of 400 N/m beside the pulse; the response is the largest acceleration."""
     scene = pulled(rate, **solver)
     scene["members"]["spring"] = spring([6.0, 0.0], "ball", [3.0, 0.0], stiffness=400.0)
     scene["objectives"] = {

@@ -36,6 +36,6 @@ def _row(each: Outcome) -> str:
 
 
 def _short(message: str) -> str:
-    """A message in a cell: one line, without the place in a file that nobody has."""
+    """A message in a cell: one line, without the place in the file, which a reader has not."""
     line = " ".join(message.split())
     return line.removeprefix("<text>:")

@@ -24,7 +24,7 @@ from typing import IO, Any, Protocol
 from mdstopo.children import command
 from mdstopo.compiler.threads import VARIABLE, cores
 
-#: seconds between two looks at whether to stop, and at tasks that take too long
+#: seconds from one check whether to stop to the next, and of tasks that take too long
 PATIENCE = 0.1
 #: seconds that a worker with nothing to do is given to end by itself
 ENDING = 5.0
@@ -75,7 +75,7 @@ class TooLong:
 
 @dataclass
 class _Round:
-    """Tasks that are done together: task(place) is asked for whenever it is given to a worker.
+    """Tasks that are done together: task(place) is called whenever one is given to a worker.
 
     waiting: places of those that no worker has; attempts: how often each was given to one.
     """
@@ -294,7 +294,7 @@ class _Worker:
         self.send(("task", task))
 
     def send(self, message: object) -> None:
-        """Say something; where it is gone, the listener tells."""
+        """Send a message; that the worker is gone is told by the thread that listens to it."""
         self._send(pickle.dumps(message))
 
     def _send(self, message: bytes) -> None:

@@ -15,7 +15,7 @@ from mdstopo.optimizer.start_families import Family, begins_at_best, family_of
 from mdstopo.optimizer.state import State
 from mdstopo.plan import race as races
 from mdstopo.plan.front_plan import Planner, Request, Starts
-from mdstopo.plan.race import race, rivals
+from mdstopo.plan.race import in_contest, race
 from mdstopo.plan.solve_task import Task, failed
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
@@ -46,7 +46,7 @@ def first() -> State:
 
 
 def tasks_of(count: int) -> list[Task]:
-    return rivals([Task(0, U, np.full(3, float(k)), 100) for k in range(count)])
+    return in_contest([Task(0, U, np.full(3, float(k)), 100) for k in range(count)])
 
 
 def at(state: State, iteration: int, objective: float, level: float) -> State:
@@ -74,7 +74,7 @@ def raced(contests, alone, answer):
 
 
 def test_starts_of_a_solve_go_on_in_quotas_and_others_go_to_their_ends_beside_them(first: State) -> None:
-    """Of four starts the best two go on; what lags ends at the first quota; nothing waits for what has no rivals."""
+    """Of four starts the best two go on; what lags ends at the first quota; nothing waits for what has no contest."""
 
     def answer(task: Task):
         if task.quota is None:
@@ -122,7 +122,7 @@ def test_what_an_earlier_process_has_decided_is_not_decided_again(first: State) 
 def test_who_goes_on_depends_on_all_rivals_and_so_do_keys() -> None:
     three, four = tasks_of(3), tasks_of(4)
     assert three[0].key("c") != four[0].key("c")
-    assert rivals(tasks_of(1))[0].rivals == ""
+    assert in_contest(tasks_of(1))[0].contest == ""
     task = four[0]
     assert replace(task, quota=20).key("c") == task.key("c")
     assert len({replace(task, **change).key("c") for change in ({}, {"softened": True}, {"iterate": 3})}) == 3
@@ -163,7 +163,7 @@ def test_ends_and_gaps_begin_from_the_families_of_a_run() -> None:
 def test_a_front_of_one_start_asks_for_nothing_more() -> None:
     planner = Planner(Request(spread(3), "nbi", 2.0, True, np.ones(2), Starts(np.zeros(1)), 10))
     tasks = next(planner.rounds())
-    assert [(task.point, task.quota, task.rivals) for task in tasks] == [(-1, None, ""), (-2, None, "")]
+    assert [(task.point, task.quota, task.contest) for task in tasks] == [(-1, None, ""), (-2, None, "")]
 
 
 @pytest.fixture(scope="module")

@@ -69,7 +69,7 @@ class Law(Value):
 
     @property
     def holds(self) -> bool:
-        """Whether it may hold something at rest."""
+        """Whether its force may be other than zero in a static equilibrium."""
         return True
 
     def force_at(self, stretch: FloatArray, rate: FloatArray) -> FloatArray | None:

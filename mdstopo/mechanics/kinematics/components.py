@@ -1,4 +1,4 @@
-"""What is looked at of a vector that changes with time: codes that kernels of both kinds of bodies share."""
+"""What a response takes of a vector that changes with time: codes that kernels of both kinds of bodies share."""
 
 #: a component, the norm, or, of vectors in a plane, ACROSS: the component perpendicular to the vector as it is, whose
 #: own value is 0

@@ -869,7 +869,7 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
       model: the compiled scene.
       code, p (PARAMETERS,): the law and its parameters.
       lo, count: the first member (padded), and how many there are.
-      counted: whether their energy is looked at.
+      counted: whether theirs is part of the stored energy.
       t, value: time (s), and the tabulated force then (N).
       member_state (3, columns): scale, mode and permanent set of every member.
       r (POSE,): relative pose of the pair.

@@ -254,7 +254,7 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
 
 @part
 def has_spring_energies(model):
-    """`member_designs` has them."""
+    """No: in a plane energies are part of `member_designs`."""
     return False
 
 

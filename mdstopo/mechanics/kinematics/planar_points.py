@@ -60,7 +60,7 @@ def point_response(order, component, s, before, home_b, home_r, qb, vb, ab, qr, 
     uy = home_y + since_y
     wb = vb[2]
     w = vr[2]
-    # global vector y, whose components along r's axes are looked at
+    # global vector y, whose components along r's axes are the response
     if order == DISPLACEMENT:
         yx = ux
         yy = uy

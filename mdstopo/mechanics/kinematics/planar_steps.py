@@ -110,13 +110,13 @@ def shift_tangents(model, q, moved, out):
 
 @part
 def slope_by_shift(model, slopes, m, r, i, tangents, body):
-    """As it is; see `kinematics_interface.slope_by_shift`."""
+    """The slope itself, as turns of a plane add; see `kinematics_interface.slope_by_shift`."""
     return slopes[m, r, i]
 
 
 @part
 def turn_slope_by_shift(model, slopes, d, r, tangents, body):
-    """As it is; see `kinematics_interface.turn_slope_by_shift`."""
+    """The slope itself, as turns of a plane add; see `kinematics_interface.turn_slope_by_shift`."""
     return slopes[d, r]
 
 

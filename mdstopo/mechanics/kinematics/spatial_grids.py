@@ -356,7 +356,7 @@ def _design_tiles(counter, member, width, start, count, length, k, rel, u, pair,
 
 @part
 def _begin_designs(member, width, start, row, length, rel, u, pair, room):
-    """Find c of rows, and by what u changes d + a along r (m).
+    """Find of each row c = p - d, and u + u_theta x c, from which the work of a virtual change u follows (m).
 
     member, width, start, length, rel, u, pair: as of `grid_designs`. row: number of the first row.
     room (rows, S, 6): out.

@@ -12,7 +12,7 @@ _AT = 1e-3
 def half_turn(pairs: IndexArray, home: FloatArray, q: FloatArray) -> tuple[int, int] | None:
     """The first of the states q (T, n_q) at which a pair has turned so far, and which; None where none has.
 
-    pairs (K, 2): the bodies of bushings, or of rotations that are looked at. home (n_bodies, HOME): where these start.
+    pairs (K, 2): the bodies of bushings, or of rotations that are responses. home (n_bodies, HOME): where these start.
 
     The turn S S_home^T of the second body seen from the first, with R = R_home E(e) of each, is
     E(e_a)^T M E(e_b) M^T, M = R_home,a^T R_home,b: its quaternion conj(e_a) (M e_b M^T) is continuous in its sign, as

@@ -242,7 +242,7 @@ def elastic_designs(member, width, start, stop, k, rel, u, p, out):
 def alike_designs(member, width, start, stop, p, rel, u, pair, room, out):
     """Add sum_j f (b . u_j) over S poses of each member, at alpha^mu = 1, for R rows.
 
-    Members are looked at once for all rows.
+    One pass over the members serves all rows.
 
     In:
       member (6 M,): rows of `spring` of all members behind each other.
@@ -280,7 +280,7 @@ def alike_designs(member, width, start, stop, p, rel, u, pair, room, out):
 
 @kernel
 def elastic_designs_of_rows(member, width, start, stop, k, rel, u, pair, room, out):
-    """Do `elastic_designs` for R rows: members are looked at once for all.
+    """Do `elastic_designs` for R rows: one pass over the members serves all.
 
     In:
       member (6 M,): rows of `spring` of all members behind each other.

@@ -25,7 +25,7 @@ def upper_triangle(xx, xy, yy, xt, yt, tt, w, wx, wy):
 
 @part
 def add_forces(found, counted, out):
-    """Add Q and E of undamped springs to out (SUMS,); counted: whether theirs is energy that is looked at."""
+    """Add Q and E of undamped springs to out (SUMS,); counted: whether theirs is part of the stored energy."""
     for i in range(3):
         out[i] += found[i]
     if counted:
