@@ -131,6 +131,7 @@ def make_workspace(model):
     room = np.zeros(slopes + 2 * n // freedoms(model) * shift_size(model))
     tangents = room[slopes:].reshape((2, n // freedoms(model), shift_size(model)))
     shift_tangents(model, model.q0, model.q0, tangents[NO_SHIFT])
+    inverse = inverse_masses(model)
     return Workspace(
         room[:turned].reshape((model.home.shape[0], attitude(model))),
         room[turned:rel].reshape((n_pair, pose_size(model))),
@@ -149,8 +150,8 @@ def make_workspace(model):
         np.zeros(total, np.int64),
         room[gram:x],
         np.ones(total),
-        inverse_masses(model),
-        spread_masses(model),
+        inverse,
+        spread_masses(model, inverse),
         room[by_v:pull].reshape((n_joint, rows, both)),
         room[own:gram],
         np.ones((2, model.size[0])),

@@ -55,6 +55,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     window_turn,
     window_vjp,
 )
+from mdstopo.mechanics.kinematics.vectors import minus, put, times, vector_at
 
 COUNTS = LEVELS
 MOST = max(LEVELS)
@@ -256,8 +257,8 @@ def _subtract_block(inverse, k, first, second, row, column, each, out):
         w = inverse[row + r]
         own = out[row + r]
         given = k[first + r]
-        for c in range(each):
-            own[column + c] -= w * given[second + c]
+        for c in range(0, each, 3):  # three at once, as no other number is read in between
+            put(own, column + c, minus(vector_at(own, column + c), times(w, vector_at(given, second + c))))
 
 
 @kernel

@@ -312,12 +312,19 @@ def _slopes_of_rates(r, t, n):
 @part
 def pair_matrix_vjp(model, p, m, z, bar):
     """bar -= m^T z; see `kinematics_interface.pair_matrix_vjp`."""
-    for i in range(2 * FREEDOMS):
-        body = model.pair[p, i // FREEDOMS]
-        value = z[FREEDOMS * body + i % FREEDOMS]
-        if value != 0.0:
-            for j in range(2 * FREEDOMS):
-                bar[FREEDOMS * model.pair[p, j // FREEDOMS] + j % FREEDOMS] -= m[i, j] * value
+    for side in range(2):
+        first = FREEDOMS * side
+        at = FREEDOMS * model.pair[p, side]
+        push = (0.0, 0.0, 0.0)
+        moment = (0.0, 0.0, 0.0)
+        for i in range(2):
+            own = FREEDOMS * model.pair[p, i]
+            for r in range(FREEDOMS):
+                row = m[FREEDOMS * i + r]
+                push = plus(push, times(z[own + r], vector_at(row, first)))
+                moment = plus(moment, times(z[own + r], vector_at(row, first + 3)))
+        put(bar, at, minus(vector_at(bar, at), push))
+        put(bar, at + 3, minus(vector_at(bar, at + 3), moment))
 
 
 @part
