@@ -218,17 +218,17 @@ def _sum_tile(member, width, scale, start, row, first, last, length, p, r, count
             square = dot(x, x)
             y = inverse_root(square, ZERO_LENGTH_SQUARED)
             stretch = _stretch(moved, x, square, y, load(member, L0 * width + at), load(member, EXCESS * width + at))
-            s = unmarked(load(scale, at), done)
+            s = where_larger(square, ZERO_LENGTH_SQUARED, unmarked(load(scale, at), done))
             elastic = s * stretch
             w = elastic * y
             if counted:
-                energy = energy + where_larger(square, ZERO_LENGTH_SQUARED, elastic * stretch)
+                energy = energy + elastic * stretch
             if not elastic_alone:
                 pull = plus(pull, times(w, x))
                 w = w + s * (preload + damping * (y * dot(x, vector_at(room[j], 3)))) * y
             push = plus(push, times(w, x))
             if tangent:
-                weight, trace, two, others = _add_slope((weight, trace, two, others), x, square, y, s, w)
+                weight, trace, two, others = _add_slope((weight, trace, two, others), x, y, s, w)
             at += length
         force = plus(force[0], push), plus(force[1], cross(a, push))
         if not elastic_alone:
@@ -244,17 +244,17 @@ def _sum_tile(member, width, scale, start, row, first, last, length, p, r, count
 
 
 @part
-def _add_slope(sums, x, square, y, s, w):
+def _add_slope(sums, x, y, s, w):
     """Sums over the members of columns, and those of members more: of w, g, and of G xx, yy and yz, zx, xy.
 
-    sums: so far. x, square, y: r, its square and 1/L (m, m^2, 1/m). s, w: alpha^mu and f/L (1, 1/m).
+    sums: so far. x, y: r and 1/L (m, 1/m). s, w: alpha^mu and f/L, 0 without length (1, 1/m).
     """
     weight, trace, two, others = sums
     g = s - w
     along = times(g * (y * y), x)
     return (
         weight + w,
-        trace + where_larger(square, ZERO_LENGTH_SQUARED, g),
+        trace + g,
         (two[0] + along[0] * x[0], two[1] + along[1] * x[1]),
         (others[0] + along[1] * x[2], others[1] + along[2] * x[0], others[2] + along[0] * x[1]),
     )
@@ -295,14 +295,14 @@ def short_sums(member, width, scale, start, stop, length, p, r, counted, tangent
             square = dot(x, x)
             y = inverse_root(square, ZERO_LENGTH_SQUARED)
             stretch = _stretch(moved, x, square, y, load(member, L0 * width + at), load(member, EXCESS * width + at))
-            s = load(scale, at)
+            s = where_larger(square, ZERO_LENGTH_SQUARED, load(scale, at))
             elastic = s * stretch
             w = elastic * y
             if counted:
-                energy = energy + where_larger(square, ZERO_LENGTH_SQUARED, elastic * stretch)
+                energy = energy + elastic * stretch
             push = plus(push, times(w, x))
             if tangent:
-                weight, trace, two, others = _add_slope((weight, trace, two, others), x, square, y, s, w)
+                weight, trace, two, others = _add_slope((weight, trace, two, others), x, y, s, w)
         force = plus(force[0], push), plus(force[1], cross(a, push))
         if tangent:
             diagonal = two[0], two[1], trace - two[0] - two[1]
@@ -497,6 +497,50 @@ def _design_columns(member, width, start, row, begin, length, k, rel, pair, room
             work = work + stretch * y * dot(x, vector_at(room[j, m], 3))
         store(out, at, load(out, at) + k * unmarked(work, done))
         at += length
+
+
+@kernel
+def short_designs(member, width, start, stop, length, k, rel, u, pair, out):
+    """`grid_designs` whatever the length of rows.
+
+    In:
+      member, width, length, k, rel, u, pair: as of `grid_designs`.
+      start, stop: the members meant in whole vectors; padding becomes something that nobody reads.
+    Out:
+      out (M or more,): added to.
+    """
+    poses = rel.shape[0]
+    seen = np.empty((poses, SEEN + 3, lanes()))
+    step = period(length, lanes()) * lanes()
+    for first in range(start, min(start + step, stop), lanes()):
+        q = _rows(member, width, Q, first)
+        for m in range(poses):
+            r = rel[m, pair]
+            a = turned(r, S, q)
+            end = plus(a, vector_at(r, D))
+            moved = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, q))
+            change = plus(vector_at(u[m, pair], 0), cross(vector_at(u[m, pair], 3), a))
+            own = seen[m]
+            for c in range(3):
+                store(own[c], 0, end[c])
+                store(own[3 + c], 0, 2.0 * moved[c])
+                store(own[SEEN + c], 0, change[c])
+            store(own[6], 0, dot(moved, moved))
+        for at in range(first, stop, step):
+            p = _rows(member, width, P, at)
+            free = load(member, L0 * width + at)
+            excess = load(member, EXCESS * width + at)
+            work = zero()
+            for m in range(poses):
+                own = seen[m]
+                x = minus((load(own[0], 0), load(own[1], 0), load(own[2], 0)), p)
+                moved = (load(own[3], 0), load(own[4], 0), load(own[5], 0)), load(own[6], 0)
+                square = dot(x, x)
+                y = inverse_root(square, ZERO_LENGTH_SQUARED)
+                stretch = _stretch(moved, x, square, y, free, excess)
+                change = load(own[SEEN], 0), load(own[SEEN + 1], 0), load(own[SEEN + 2], 0)
+                work = work + stretch * y * dot(x, change)
+            store(out, at, load(out, at) + k * work)
 
 
 @kernel

@@ -17,7 +17,14 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.padding import whole_vectors
 from mdstopo.mechanics.kinematics.spatial_forces import C, K
-from mdstopo.mechanics.kinematics.spatial_grids import THREADS, grid_designs, grid_far, grid_sums, short_sums
+from mdstopo.mechanics.kinematics.spatial_grids import (
+    THREADS,
+    grid_designs,
+    grid_far,
+    grid_sums,
+    short_designs,
+    short_sums,
+)
 from mdstopo.mechanics.kinematics.spatial_lines import (
     NO_LENGTH,
     add_line_stiffness,
@@ -279,6 +286,8 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     if row > 0:
         threads = model.size[THREADS] if count >= MANY else np.int64(1)
         grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, threads, out)
+    elif row < 0:
+        short_designs(rows, width, lo, lo + whole_vectors(count), -row, p[0], rel, u, pair, out)
     else:
         elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
 
