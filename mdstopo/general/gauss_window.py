@@ -25,7 +25,7 @@ from mdstopo.general.accelerations import accelerations_jvp, matrices_vjp, turns
 from mdstopo.general.forces import forces_of_sums, place_pairs
 from mdstopo.general.members import sums_at_poses
 from mdstopo.general.step_history import copy_vector
-from mdstopo.general.strides import place_of_turn, sums_size
+from mdstopo.general.strides import sums_size
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import DAMPED, TURNING
 from mdstopo.integrators.gauss_tables import LEVELS
@@ -227,11 +227,14 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
                 if coupled:
                     _subtract_block(inverse, history.C[o, p], first, each * (i % 2), row, column, each, by_v)
     turn = history.turn[o]
-    for d in range(m):
-        for r in range(rotations(model)):
-            by_q[d, place_of_turn(model, d, r)] += inverse[d] * turn[d, r]
-        for r in range(rotations(model), load_slopes(model)):
-            by_v[d, place_of_turn(model, d, r - rotations(model))] += inverse[d] * turn[d, r]
+    turns = rotations(model)
+    for first in range(0, m, each):
+        column = first + each - turns
+        for d in range(first, first + each):
+            for r in range(turns):
+                by_q[d, column + r] += inverse[d] * turn[d, r]
+            for r in range(turns, load_slopes(model)):
+                by_v[d, column + r - turns] += inverse[d] * turn[d, r]
     window_slopes(model, maps, coupled, by_q, by_v)
     if by_rows:
         take_rows(by_q, np.int64(m), by_x)
