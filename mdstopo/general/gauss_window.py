@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.vector import lanes, load, store
+from mdstopo.compiler.vector import lanes, load, store, zero
 from mdstopo.general.accelerations import accelerations_jvp, matrices_vjp, turns_vjp
 from mdstopo.general.forces import forces_of_sums, place_pairs
 from mdstopo.general.members import sums_at_poses
@@ -215,8 +215,10 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
     coupled = is_coupled(model, workspace)
     m = by_q.shape[0]
     each = freedoms(model)
-    by_q[:] = 0.0
-    by_v[:] = 0.0
+    for d in range(m):
+        for e in range(0, by_q.shape[1], lanes()):
+            store(by_q[d], e, zero())
+            store(by_v[d], e, zero())
     for p in range(model.pair.shape[0]):
         for i in range(4):
             row = each * model.pair[p, i // 2]
