@@ -90,11 +90,11 @@ def test_installed_peers_find_a_peak_inside_in_space(name):
 
     if PEERS_IN_SPACE[name].missing():
         pytest.skip(f"{name} is not installed")
-    case = read_case(spatial_pair(along=4, line=3, stiffness=8000.0), overrides={"solver.tolerance": "1e-11"})
+    case = read_case(spatial_pair(along=4, line=3, stiffness=3000.0), overrides={"solver.tolerance": "1e-11"})
     alpha = np.linspace(0.1, 1.0, case.n_design)
     exact = mdstopo.evaluate(case, alpha)
     (peak,) = exact.peaks["G"]
-    assert 0.05 < peak.time < 0.15
+    assert 0.14 < peak.time < 0.16
     course = Field(spatial_problem_of(case), [alpha], [Reference(peak.value, exact.gradients["G"])])
     setting = {"steps": 12} if name == "jax" else {"tolerance": 1e-9}
     ((found,),) = race(course, [Entry(name, setting)], rounds=1, seconds=0.0, peers=PEERS_IN_SPACE)
