@@ -38,10 +38,10 @@ ORDERS = (
 
 
 def orders() -> Iterator[Table]:
-    """Four tables."""
+    """Tables of orders, of the agreement, and of drifts."""
     yield from map(_order, ORDERS)
     yield _agreement()
-    yield drift()
+    yield from drift()
 
 
 def _order(wanted: Order) -> Table:

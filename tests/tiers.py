@@ -23,6 +23,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "bench/test_hunt_space.py": ("second_model[1", "second_model[4"),
     "bench/test_optimum.py": ("rows[belts product", "rows[machine"),
     "bench/test_peers.py": ("installed_peers", "jax_moves_as_ours"),
+    "bench/test_peers_in_space.py": ("installed_peers",),
     "cli/test_cli_commands.py": ("goes_on[2-", "goes_on[1-pareto"),
     "cli/test_finalize.py": ("a_fixed_step_is_verified",),
     "cli/test_plot_export_new.py": ("starter_case_is_right",),
@@ -115,6 +116,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "space/test_implicit_steps.py": ("",),
     "space/test_law_parameters.py": ("",),
     "space/test_names_in_space.py": ("",),
+    "space/test_orders_in_space.py": ("[gauss",),
     "space/test_windows.py": ("",),
     "stress/test_stress.py": ("alpha", "periods-", "turns-wheel", "turns-driven", "-slow-"),
     "variables/test_crush.py": (

@@ -5,7 +5,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from benchmarks.peers.casadi_sundials import options_of
+from benchmarks.peers.casadi_model import Model
+from benchmarks.peers.casadi_sundials import objective_of
 from benchmarks.peers.problem import GROUND, Floats, Indices
 from benchmarks.peers.space_problem import SpatialProblem
 from benchmarks.peers.table import Objective
@@ -14,33 +15,22 @@ Scalar = Any
 
 
 def make(problem: SpatialProblem, tolerance: float = 1e-8, compiled: bool = False) -> Objective:
-    """As the table says, for the energy at the end. compiled: by a C compiler, which takes minutes."""
-    y, alpha, rate, energy = expressions(problem)
+    """As the table says. compiled: by a C compiler, which takes minutes."""
     start = np.concatenate([problem.start.ravel(), problem.turn.ravel(), np.zeros(6 * problem.bodies)])
-    equations = {"x": y, "p": alpha, "ode": problem.end * rate}
-    options = options_of(tolerance, "cvodes", compiled)
-    design = ca.MX.sym("design", problem.members)
-    last = ca.integrator("last", "cvodes", equations, 0, 1, options)(x0=start, p=design)["xf"]
-    value = ca.Function("energy", [y, alpha], [energy])(last, design)
-    both = ca.Function("both", [design], [value, ca.gradient(value, design)])
-    alone = ca.Function("alone", [design], [value])
-
-    def objective(design: Floats, gradient: bool) -> tuple[float, Floats | None]:
-        if not gradient:
-            return float(alone(design)), None
-        found, slopes = both(design)
-        return float(found), np.asarray(slopes).ravel()
-
-    return objective
+    return objective_of(problem, model_of(problem), start, tolerance, "cvodes", compiled)
 
 
-def expressions(problem: SpatialProblem) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """The state y (13 B: places, quaternions, velocities, turning in body axes), alpha, y' and the energy."""
+def model_of(problem: SpatialProblem) -> Model:
+    """The expressions of a state of 13 B: places, quaternions, velocities, turning in body axes.
+
+    There are none with multipliers as unknowns.
+    """
     count = problem.bodies
     y, alpha = ca.SX.sym("y", 13 * count), ca.SX.sym("alpha", problem.members)
     turns = [_rotation(y[3 * count + 4 * b : 3 * count + 4 * b + 4]) for b in range(count)]
     v, w = y[7 * count : 10 * count], y[10 * count :]
-    total, energy = _members(problem, y, turns, alpha)
+    pulls, energy = _members(problem, y, turns, alpha)
+    total = [ca.SX(ca.DM(force)) + pull for force, pull in zip(problem.force, pulls, strict=True)]
     e_rates, forces = [], []
     for b, turn in enumerate(turns):
         e, spin = y[3 * count + 4 * b : 3 * count + 4 * b + 4], w[3 * b : 3 * b + 3]
@@ -60,7 +50,13 @@ def expressions(problem: SpatialProblem) -> tuple[Scalar, Scalar, Scalar, Scalar
         ahead = inverse @ (force - rows.T @ ca.ldl_solve(rows @ ahead - wanted, *factors))
     by_body = [ahead[6 * b : 6 * b + 6] for b in range(count)]
     parts = [v, *e_rates, *(each[:3] for each in by_body), *(each[3:] for each in by_body)]
-    return y, alpha, ca.vertcat(*parts), energy
+    # what the springs pull is minus the slope of their energy
+    power = -sum(
+        ca.dot(pull[:3], v[3 * b : 3 * b + 3]) + ca.dot(turns[b].T @ pull[3:], w[3 * b : 3 * b + 3])
+        for b, pull in enumerate(pulls)
+    )
+    none = ca.SX(0, 1)
+    return Model(y, none, alpha, ca.vertcat(*parts), energy, power, none, none)
 
 
 def _rotation(e: Scalar) -> Scalar:
@@ -69,8 +65,8 @@ def _rotation(e: Scalar) -> Scalar:
 
 
 def _members(problem: SpatialProblem, y: Scalar, turns: list[Scalar], alpha: Scalar) -> tuple[list[Scalar], Scalar]:
-    """Forces and moments (6,) on every body, loads included, and the energy of the springs."""
-    total = [ca.SX(ca.DM(force)) for force in problem.force]
+    """Forces and moments (6,) of the springs on every body, and their energy."""
+    total = [ca.SX.zeros(6) for _ in range(problem.bodies)]
     energy = ca.SX(0.0)
     for bodies, part in zip(problem.groups.tolist(), problem.slices(), strict=True):
         (p, at_p), (q, at_q) = _points(problem.p[part]), _points(problem.q[part])

@@ -18,10 +18,20 @@ FLAGS = ["-O1", "-march=native"]
 
 def make(problem: Problem, tolerance: float = 1e-8, method: str = "cvodes", compiled: bool = False) -> Objective:
     """As the table says. method: cvodes or idas. compiled: by a C compiler, which takes minutes."""
-    model = model_of(problem)
+    start = np.concatenate([problem.start.ravel(), np.zeros(3 * problem.bodies)])
+    return objective_of(problem, model_of(problem), start, tolerance, method, compiled)
+
+
+def objective_of(
+    problem: Problem, model: Model, start: Floats, tolerance: float, method: str, compiled: bool
+) -> Objective:
+    """The benchmark's objective of any equations of motion.
+
+    problem: what is computed, of which only the members, the end and whether a peak is wanted are looked at.
+    model: its expressions. start: the state at the start. tolerance, method, compiled: as of `make`.
+    """
     # time runs to 1, and the end is a parameter, so that a run to another time needs no other integrator
     end, alpha = ca.SX.sym("end"), model.alpha
-    start = np.concatenate([problem.start.ravel(), np.zeros(3 * problem.bodies)])
     options = options_of(tolerance, method, compiled)
     if method == "cvodes":
         equations = {"x": model.y, "p": ca.vertcat(alpha, end), "ode": end * model.rate}

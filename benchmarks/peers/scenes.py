@@ -42,7 +42,8 @@ def ring() -> str:
 def spatial_pair(along: int = 20, line: int = 17, stiffness: float = 225.0, over_time: str = "max") -> str:
     """Two bodies as in the paper's Section IV.A, but with full inertia, in all three directions, 20 x 51 springs.
 
-    along: points of the torso; line: points of each of the frame's three lines. The energy is highest at the end.
+    along: points of the torso; line: points of each of the frame's three lines. The energy of a uniform design is
+    highest at the end, that of a random one may be before.
     """
     lines = [([-1, -0.4, -0.8], [-1, 0.4, 0.8]), ([-0.8, 0.3, -1], [0.8, -0.3, -1]), ([1, 0.4, -0.8], [1, -0.4, 0.8])]
     return json.dumps(

@@ -106,7 +106,7 @@ class Entry(Kernel):
         return native(*arguments)
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
-        """The entry with these arguments, to be called again and again with other numbers by their position.
+        """The entry with these arguments, to be called again and again; numbers are changed by their position, to stay.
 
         Arrays stay these arrays, wherever their contents change; they must not be resized.
         """
@@ -114,8 +114,9 @@ class Entry(Kernel):
         if native is not None:
             return native.prepare(*arguments)
 
+        now = list(arguments)
+
         def call(*changes: tuple[int, Any]) -> Any:
-            now = list(arguments)
             for place, value in changes:
                 now[place] = value
             return self._by_numba(*now)

@@ -131,6 +131,7 @@ def make_workspace(model):
     room = np.zeros(slopes + 2 * n // freedoms(model) * shift_size(model))
     tangents = room[slopes:].reshape((2, n // freedoms(model), shift_size(model)))
     shift_tangents(model, model.q0, model.q0, tangents[NO_SHIFT])
+    inverse = inverse_masses(model)
     return Workspace(
         room[:turned].reshape((model.home.shape[0], attitude(model))),
         room[turned:rel].reshape((n_pair, pose_size(model))),
@@ -149,8 +150,8 @@ def make_workspace(model):
         np.zeros(total, np.int64),
         room[gram:x],
         np.ones(total),
-        inverse_masses(model),
-        spread_masses(model),
+        inverse,
+        spread_masses(model, inverse),
         room[by_v:pull].reshape((n_joint, rows, both)),
         room[own:gram],
         np.ones((2, model.size[0])),
@@ -570,11 +571,14 @@ def subtract_matrices(model, k, x, out):
 @kernel
 def turns_vjp(model, turn, z, bar_q, bar_v):
     """bar_q, bar_v (n,) += (slopes of the loads)^T z, turn (n, `load_slopes`) by turns, then by turning rates."""
-    for d in range(z.shape[0]):
-        for r in range(rotations(model)):
-            bar_q[place_of_turn(model, d, r)] += turn[d, r] * z[d]
-        for r in range(rotations(model), load_slopes(model)):
-            bar_v[place_of_turn(model, d, r - rotations(model))] += turn[d, r] * z[d]
+    turns = rotations(model)
+    for first in range(0, z.shape[0], freedoms(model)):
+        own = first + freedoms(model) - turns
+        for d in range(first, first + freedoms(model)):
+            for r in range(turns):
+                bar_q[own + r] += turn[d, r] * z[d]
+            for r in range(turns, load_slopes(model)):
+                bar_v[own + r - turns] += turn[d, r] * z[d]
 
 
 @kernel

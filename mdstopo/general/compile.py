@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.model import GROUND, Case, LoadCase, Response, ResponseRow
+from mdstopo.case.model import GROUND, Case, LoadCase, MemberGroup, Response, ResponseRow
 from mdstopo.case.responses import kind_of
 from mdstopo.compiler.threads import allowed
 from mdstopo.general import responses as responses_of
@@ -33,7 +33,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.kinematics.timed import ADDRESS
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.bodies import distances, stands_as
-from mdstopo.scene.grids import row_of
+from mdstopo.scene.grids import row_of, short_row_of
 from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
 from mdstopo.scene.other_kernels import include_kernels
@@ -226,6 +226,13 @@ def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...
         raise CaseError(mistakes, str(case.path or case.name))
 
 
+def _row_of(group: MemberGroup, one_block: bool) -> int:
+    """ROW of a group's blocks (`general.model`); one_block: whether all members are in one."""
+    if not one_block:
+        return 0
+    return row_of(group, elastic=True)[1] or -short_row_of(group)
+
+
 def _members(
     case: Case,
     dimension: Dimension,
@@ -267,7 +274,7 @@ def _members(
             known = np.zeros((segments, 2)) if kernels.signal is None else segment_values(kernels.signal(record), times)
             parts = np.arange(len(group))[:, None] if each_member(case, group, place) else np.arange(len(group))[None]
             # rows of a grid share their first ends, which a turned group has on the ground
-            row = row_of(group, elastic=len(parts) == 1)[1] if first_body == group.body_from else 0
+            row = _row_of(group, one_block=len(parts) == 1) if first_body == group.body_from else 0
             for part in parts:
                 count = len(part)
                 padded = -(-count // VECTOR) * VECTOR

@@ -118,6 +118,23 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
     )  # fmt: skip
 
 
+@kernel
+def members_alone(model, member_state, segment, t, q, v, workspace):
+    """The sums over the members at one state, and nothing else: what `general_forces` leaves of them.
+
+    Constant:
+      model: the compiled scene.
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      segment, t: segment of `model.times`, and time in it (s).
+      q (n_q,), v (n,): coordinates and velocities.
+    In and out:
+      workspace: the workspace. Set are turned, and, of the pairs that carry more than joints, rel and sums.
+    """
+    no = np.bool_(False)
+    place_pairs(model, q, v, no, workspace, workspace.rel, workspace.sums)
+    general_sums(model, segment, t, member_state, workspace.rel, no, workspace.sums)
+
+
 @part
 def place_pairs(model, q, v, tangent, workspace, rel, sums):
     """Turn all bodies, find the relative poses of the pairs that carry more than joints, and set their sums to zero.

@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.vector import lanes, load, store
+from mdstopo.compiler.vector import lanes, load, store, zero
 from mdstopo.general.accelerations import accelerations_jvp, matrices_vjp, turns_vjp
 from mdstopo.general.forces import forces_of_sums, place_pairs
 from mdstopo.general.members import sums_at_poses
 from mdstopo.general.step_history import copy_vector
-from mdstopo.general.strides import place_of_turn, sums_size
+from mdstopo.general.strides import sums_size
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import DAMPED, TURNING
 from mdstopo.integrators.gauss_tables import LEVELS
@@ -55,6 +55,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     window_turn,
     window_vjp,
 )
+from mdstopo.mechanics.kinematics.vectors import minus, put, times, vector_at
 
 COUNTS = LEVELS
 MOST = max(LEVELS)
@@ -214,8 +215,10 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
     coupled = is_coupled(model, workspace)
     m = by_q.shape[0]
     each = freedoms(model)
-    by_q[:] = 0.0
-    by_v[:] = 0.0
+    for d in range(m):
+        for e in range(0, by_q.shape[1], lanes()):
+            store(by_q[d], e, zero())
+            store(by_v[d], e, zero())
     for p in range(model.pair.shape[0]):
         for i in range(4):
             row = each * model.pair[p, i // 2]
@@ -226,11 +229,14 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
                 if coupled:
                     _subtract_block(inverse, history.C[o, p], first, each * (i % 2), row, column, each, by_v)
     turn = history.turn[o]
-    for d in range(m):
-        for r in range(rotations(model)):
-            by_q[d, place_of_turn(model, d, r)] += inverse[d] * turn[d, r]
-        for r in range(rotations(model), load_slopes(model)):
-            by_v[d, place_of_turn(model, d, r - rotations(model))] += inverse[d] * turn[d, r]
+    turns = rotations(model)
+    for first in range(0, m, each):
+        column = first + each - turns
+        for d in range(first, first + each):
+            for r in range(turns):
+                by_q[d, column + r] += inverse[d] * turn[d, r]
+            for r in range(turns, load_slopes(model)):
+                by_v[d, column + r - turns] += inverse[d] * turn[d, r]
     window_slopes(model, maps, coupled, by_q, by_v)
     if by_rows:
         take_rows(by_q, np.int64(m), by_x)
@@ -256,8 +262,8 @@ def _subtract_block(inverse, k, first, second, row, column, each, out):
         w = inverse[row + r]
         own = out[row + r]
         given = k[first + r]
-        for c in range(each):
-            own[column + c] -= w * given[second + c]
+        for c in range(0, each, 3):  # three at once, as no other number is read in between
+            put(own, column + c, minus(vector_at(own, column + c), times(w, vector_at(given, second + c))))
 
 
 @kernel

@@ -42,9 +42,8 @@ def inverse_masses(model):
 
 
 @kernel
-def spread_masses(model):
-    """(n_joint, rows, 2 D): `inverse_masses` of the coordinate that each slope of the joints is a derivative by."""
-    inverse = inverse_masses(model)
+def spread_masses(model, inverse):
+    """(n_joint, rows, 2 D): `inverse_masses` (n,) of the coordinate that each slope of the joints is one by."""
     spread = np.empty((model.joint.shape[0], most_rows(model), pair_freedoms(model)))
     for j in range(spread.shape[0]):
         for r in range(most_rows(model)):

@@ -31,7 +31,8 @@ from mdstopo.scene.model import (
 
 #: columns of `GeneralModel.block`; code -1 is an inerter. A block has all members of a group, or where each has a
 #: parameter of its own one of them, which is number OFFSET of the group. Where every point of one grid is joined with
-#: every point of another, ROW members behind each other begin at one point; elsewhere ROW is 0
+#: every point of another, ROW members behind each other begin at one point, -ROW where that is too few for kernels of
+#: rows (`scene.grids`); elsewhere ROW is 0
 PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP, OFFSET, ROW = range(9)
 #: columns of `GeneralModel.joint`
 JOINT_CODE, JOINT_FIRST, JOINT_SECOND, JOINT_PAIR, JOINT_ROWS = range(5)

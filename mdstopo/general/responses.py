@@ -37,9 +37,9 @@ from mdstopo.general.expressions import (
     numbers_of,
     put_parameters,
 )
-from mdstopo.general.forces import inerter_force
+from mdstopo.general.forces import inerter_force, members_alone
 from mdstopo.general.members import MODE, SCALE, SET, level_of
-from mdstopo.general.method_interface import beside, derivatives
+from mdstopo.general.method_interface import beside, derivatives, is_continuous
 from mdstopo.general.model import (
     BODY,
     CODE,
@@ -1136,8 +1136,12 @@ def rated(
     order = model.response[j, ORDER]
     simple = not rates or follows_state(tag, model, j)
     by_itself = not needs_balance(model, j) and (order == 0 or (order == 1 and not rates))
+    stored = is_continuous(tag) and model.response[j, KIND] == ENERGY and simple and not balanced
     made = 0
-    if balanced or not simple or not by_itself:
+    if stored:  # sums over the members are all that is needed; other methods have use for the accelerations
+        members_alone(model, member_state, segment, t, q, v, workspace)
+        made = 1
+    elif balanced or not simple or not by_itself:
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
         made = 1
     value = response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
@@ -1147,7 +1151,7 @@ def rated(
     if simple:
         for d in range(n):
             rate += bars[0, d] * v[d]
-        if order > 0 or needs_balance(model, j):
+        if (order > 0 or needs_balance(model, j)) and not stored:
             for d in range(n):
                 rate += bars[1, d] * a[d]
         if model.response[j, KIND] == MEMBER_FORCE:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.model import CODE, INERTER, PAIR
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, load_slopes, rotations
 from mdstopo.mechanics.laws.table import SPRING
@@ -66,9 +66,8 @@ def carriers(model):
         found[model.bushing_pair[j]] = 1
     for j in range(model.contact_pair.shape[0]):
         found[model.contact_pair[j]] = 1
-    which = movers(model)
     for p in range(found.shape[0]):
-        found[p] *= which[p]
+        found[p] *= _movers_of(model, p)
     return found
 
 
@@ -76,12 +75,18 @@ def carriers(model):
 def movers(model):
     """(n_pair,): BOTH where both bodies of a pair move, SECOND or FIRST where that body alone does."""
     found = np.empty(model.pair.shape[0], np.int64)
-    each = freedoms(model)
-    moves = np.empty(2, np.int64)
     for p in range(found.shape[0]):
-        for side in range(2):
-            moves[side] = 0
-            for i in range(each):
-                moves[side] += model.free[each * model.pair[p, side] + i] != 0
-        found[p] = FIRST if moves[1] == 0 else (SECOND if moves[0] == 0 else BOTH)
+        found[p] = _movers_of(model, p)
     return found
+
+
+@part
+def _movers_of(model, p):
+    """`movers` of one pair."""
+    each = freedoms(model)
+    first = 0
+    second = 0
+    for i in range(each):
+        first += model.free[each * model.pair[p, 0] + i] != 0
+        second += model.free[each * model.pair[p, 1] + i] != 0
+    return FIRST if second == 0 else (SECOND if first == 0 else BOTH)

@@ -77,3 +77,26 @@ def test_what_is_not_at_rest_or_has_other_joints_is_not_for_peers():
     document["joints"][0] |= {"type": "universal", "axes": [[1, 0, 0], [0, 1, 0]]}
     with pytest.raises(NotForPeersError, match="only spherical joints"):
         spatial_problem_of(read_case(json.dumps(document)))
+
+
+@pytest.mark.parametrize("name", ["jax", "casadi"])
+def test_installed_peers_find_a_peak_inside_in_space(name):
+    import mdstopo
+    from benchmarks.peers.race import Entry, Field, race
+    from benchmarks.peers.scenes import spatial_pair
+    from benchmarks.peers.table import PEERS_IN_SPACE
+    from benchmarks.peers.translate import spatial_problem_of
+    from mdstopo.bench.reference import Reference
+
+    if PEERS_IN_SPACE[name].missing():
+        pytest.skip(f"{name} is not installed")
+    case = read_case(spatial_pair(along=4, line=3, stiffness=3000.0), overrides={"solver.tolerance": "1e-11"})
+    alpha = np.linspace(0.1, 1.0, case.n_design)
+    exact = mdstopo.evaluate(case, alpha)
+    (peak,) = exact.peaks["G"]
+    assert 0.14 < peak.time < 0.16
+    course = Field(spatial_problem_of(case), [alpha], [Reference(peak.value, exact.gradients["G"])])
+    setting = {"steps": 12} if name == "jax" else {"tolerance": 1e-9}
+    ((found,),) = race(course, [Entry(name, setting)], rounds=1, seconds=0.0, peers=PEERS_IN_SPACE)
+    assert found.value_error < 1e-6
+    assert found.gradient_error < 1e-5

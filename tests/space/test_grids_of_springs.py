@@ -24,26 +24,29 @@ FORCE, ENERGY, PULL, K = slice(0, 6), 6, slice(7, 13), slice(13, 49)
 LAWS = {"elastic": (3.0, 0.0, 0.0), "preloaded": (2.0, 0.0, -0.7), "damped": (1.5, 0.4, 0.3)}
 #: members of a row: two vectors that overlap, one vector, two whole ones
 LENGTHS = (11, 8, 16)
+#: members of a row and rows where vectors have members of several rows: columns come again after five vectors, in every
+#: vector, after three of which the last is incomplete, in the first vector alone
+SHORT = ((10, 9), (4, 5), (6, 9), (2, 3))
 Q, V, _ = state()
 
 
-def grid(length: int) -> tuple[Any, np.ndarray]:
-    """A model whose pair 0 has ROWS rows of springs from START on, other members around them, and their states."""
+def grid(length: int, rows: int = ROWS, width: int = WIDTH) -> tuple[Any, np.ndarray]:
+    """A model whose pair 0 has rows of springs from START on, other members around them, and their states."""
     model, rng = scene(), np.random.default_rng(length)
-    member = rng.normal(size=(8, WIDTH))
-    of = slice(START, START + ROWS * length)
-    member[:3, of] = np.repeat(rng.normal(size=(3, ROWS)), length, axis=1)
-    member[3:6, of] = np.tile(rng.normal(size=(3, length)), ROWS)
+    member = rng.normal(size=(8, width))
+    of = slice(START, START + rows * length)
+    member[:3, of] = np.repeat(rng.normal(size=(3, rows)), length, axis=1)
+    member[3:6, of] = np.tile(rng.normal(size=(3, length)), rows)
     one, two = model.pair[0]
     ends = [
         model.home[b, :3, None] + model.home[b, 3:12].reshape(3, 3) @ p
         for b, p in ((one, member[:3]), (two, member[3:6]))
     ]
-    member[6] = rng.uniform(0.5, 1.5, WIDTH)
+    member[6] = rng.uniform(0.5, 1.5, width)
     member[7] = ((ends[1] - ends[0]) ** 2).sum(axis=0) - member[6] ** 2
     model.member = member
-    states = np.zeros((3, WIDTH))
-    states[0] = rng.uniform(0.1, 1.0, WIDTH)
+    states = np.zeros((3, width))
+    states[0] = rng.uniform(0.1, 1.0, width)
     return model, states
 
 
@@ -74,6 +77,25 @@ def test_sums_are_those_of_the_springs_one_by_one(law: str, length: int, near: f
         same(found[part], expected[part], 4e-15 * count)
     same(bare[:13], found[:13], 1e-15)
     assert not bare[13:].any()
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("length", "rows"), SHORT)
+@pytest.mark.parametrize("near", [1.0, 1e-7])
+def test_sums_of_short_rows_are_those_of_the_springs_one_by_one(law: str, length: int, rows: int, near: float) -> None:
+    model, states = grid(length, rows, 128)
+    count = rows * length
+    states[0, START + count :] = 0.0  # padding
+    r, p = pose(model, near), np.array([*LAWS[law], 0.0, 0.0, 0.0, 0.0, 0.0])
+    found, expected, bare = np.zeros((3, SUMS))
+    KERNELS.spring_sums(model, p, START, count, -length, True, states, r, True, found)
+    KERNELS.member_sums(model, SPRING, p, START, count, True, 0.0, 0.0, states, r, True, expected)
+    for part in (FORCE, ENERGY, PULL, K, slice(49, 70)):
+        same(found[part], expected[part], 4e-15 * count)
+    KERNELS.spring_sums(model, p, START, count, -length, False, states, r, False, bare)
+    same(bare[FORCE], found[FORCE], 1e-15)
+    assert not bare[6:].any()
 
 
 @pytest.mark.usefixtures("in_python")
@@ -132,22 +154,24 @@ def ends(model: Any, i: int, before: np.ndarray, after: np.ndarray) -> tuple[flo
 
 
 @pytest.mark.usefixtures("in_python")
-@pytest.mark.parametrize("length", LENGTHS)
-def test_the_derivative_of_many_poses_is_the_sum_of_theirs(length: int) -> None:
-    model, states = grid(length)
-    rng, p, count = np.random.default_rng(3), np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ROWS * length
+@pytest.mark.parametrize(("length", "rows", "sign"), [(n, ROWS, 1) for n in LENGTHS] + [(*each, -1) for each in SHORT])
+def test_the_derivative_of_many_poses_is_the_sum_of_theirs(length: int, rows: int, sign: int) -> None:
+    model, states = grid(length, rows, 128)
+    rng, p, count = np.random.default_rng(3), np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), rows * length
     rel, u = np.zeros((4, 2, POSE)), rng.normal(size=(4, 2, 6))
     for s in range(4):
         rel[s, 0] = pose(model, 0.2 * (s + 1))
-    found, expected = np.zeros((2, WIDTH))
-    KERNELS.spring_designs(model, p, START, count, length, rel, u, 0, found)
+    found, expected = np.zeros((2, 128))
+    KERNELS.spring_designs(model, p, START, count, sign * length, rel, u, 0, found)
     for s in range(4):
         KERNELS.member_designs(
             model, SPRING, p, START, count, 0.0, 0.0, states, states[1], rel[s, 0], u[s, 0], 0.0, expected
         )
+    behind = START + count if sign > 0 else START + -(-count // 8) * 8  # padding is written to
+    found[START + count : behind] = 0.0
     same(found, expected, 1e-13)
     assert not found[:START].any()
-    assert not found[START + count :].any()
+    assert not found[behind:].any()
 
 
 @pytest.mark.usefixtures("in_python")
@@ -211,6 +235,7 @@ def test_a_case_has_the_same_values_and_gradients_without_the_kernels_for_grids(
     row_of = general_compile.row_of
     with_rows = evaluated(text)
     monkeypatch.setattr(general_compile, "row_of", none)
+    monkeypatch.setattr(general_compile, "short_row_of", lambda group: 0)
     without = evaluated(text)
     assert rows == [(24, 21)]
     for name, value in without.objectives.items():
@@ -229,6 +254,7 @@ def test_a_pass_over_very_many_springs_is_the_same_with_any_number_of_threads(mo
         monkeypatch.setenv("MDSTOPO_THREADS", threads)
         found.append(evaluated(text))
     monkeypatch.setattr(general_compile, "row_of", lambda *arguments, **options: (0, 0))
+    monkeypatch.setattr(general_compile, "short_row_of", lambda group: 0)
     without = evaluated(text)
     one, three = found
     assert one.objectives == three.objectives

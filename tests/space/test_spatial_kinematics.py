@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -213,6 +214,40 @@ def test_joints(j: int) -> None:
     lam, stiffness = np.random.default_rng(j).normal(size=ROWS), np.zeros((12, 12))
     KERNELS.joint_stiffness(MODEL, j, placed(Q), lam, stiffness)
     same(stiffness, by_q(lambda q: phi(q)[1].T @ lam[:rows], Q)[:, :12])
+
+
+def test_joints_of_a_point_alone_are_pulled_back_as_their_slopes_say() -> None:
+    (j,) = (j for j in range(8) if KERNELS.joint_is_point(MODEL, j))
+    assert ROWS_OF[j] == 3
+    rng, w, w_dot, w_ddot = np.random.default_rng(4), np.empty(42), V[:12], A[:12]
+    KERNELS.place_joint_alone(MODEL, j, Q, w)
+    of_q, of_v, stiffness = np.zeros((ROWS, 12)), np.zeros((ROWS, 12)), np.zeros((12, 12))
+    KERNELS.joint_acceleration_slopes(MODEL, j, w, w_dot, w_ddot, of_q, of_v)
+    z, begun = rng.normal(size=N), rng.normal(size=(2, N))
+    for left_out in (None, 1):  # a row that others imply has no place among the solved ones
+        row, lam, y = np.array([2, 0, 3, -1, -1, -1]), rng.normal(size=ROWS), rng.normal(size=4)
+        kept = [r for r in range(3) if r != left_out]
+        if left_out is not None:
+            row[left_out], lam[left_out] = -1, 0.0
+        stiffness[:] = 0.0
+        KERNELS.joint_stiffness(MODEL, j, w, lam, stiffness)
+        found, expected = begun.copy(), begun.copy()
+        expected[0, :12] -= stiffness.T @ z[:12] + of_q[kept].T @ y[row[kept]]
+        expected[1, :12] -= of_v[kept].T @ y[row[kept]]
+        model = SimpleNamespace(**{**vars(MODEL), "row": np.tile(row, (8, 1))})
+        KERNELS.point_joint_vjp(model, j, w, w_dot, w_ddot, lam, z, y, *found)
+        same(found, expected, 1e-14)
+
+
+@pytest.mark.parametrize("p", [0, 1])
+def test_a_matrix_of_a_pair_is_multiplied_transposed(p: int) -> None:
+    rng = np.random.default_rng(6)
+    m, z, bar = rng.normal(size=(12, 12)), rng.normal(size=N), rng.normal(size=N)
+    both = [6 * int(body) + d for body in MODEL.pair[p] for d in range(6)]
+    expected = bar.copy()
+    expected[both] -= m.T @ z[both]
+    KERNELS.pair_matrix_vjp(MODEL, p, m, z, bar)
+    same(bar, expected, 1e-14)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])

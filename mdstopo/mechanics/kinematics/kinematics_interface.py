@@ -338,10 +338,10 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
       table (3, 17, 17), h: coefficients of the method, and length of the step (s).
       j: number of the stage.
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
-      lam_q, lam_v (n,): cotangents of the end's coordinates and velocities.
     In and out:
+      lam_q, lam_v (n,): cotangents of the end's coordinates and velocities, when the last stage comes.
       u, g (s, n): cotangents of the coordinates and velocities of later stages; stages come one after the other from
-        the last on, and what is left of the one behind j is what `start_vjp` needs.
+        the last on, and what is left of all these, of the one behind j and of lam_q and lam_v, `start_vjp` needs.
     Out:
       z (n,): the cotangent.
     """
@@ -357,7 +357,7 @@ def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
       u, g (s, n): what `stage_vjp` has left of cotangents of these; overwritten.
     In and out:
-      lam_q, lam_v (n,): cotangents of the end's coordinates and velocities, then of the start's.
+      lam_q, lam_v (n,): what it has left of those of the end, then cotangents of the start's.
     """
     raise NotImplementedError
 
@@ -887,7 +887,7 @@ def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, 
       model: the compiled scene.
       p (3 or more,): k, c, preload of the law.
       start, count: the first spring (padded), and how many there are.
-      row: of a grid, how many behind each other begin at one point (`general.model.ROW`); else 0.
+      row: of a grid, how many behind each other begin at one point, or minus that; else 0 (`general.model.ROW`).
       counted, member_state, r, tangent: as of `member_sums`.
     Out:
       o (SUMS,): added to.

@@ -83,8 +83,9 @@ def joint_places(model):
 @kernel
 def relative_pose(model, q, v, rel):
     """See `spatial_poses.fill_pose`."""
-    one = np.empty(ATTITUDE)
-    two = np.empty(ATTITUDE)
+    room = np.empty((2, ATTITUDE))
+    one = room[0]
+    two = room[1]
     for p in range(model.pair.shape[0]):
         fill_attitude(model.home, model.pair[p, 0], q, one, 0)
         fill_attitude(model.home, model.pair[p, 1], q, two, 0)

@@ -6,6 +6,7 @@ Moments on a body are in its principal axes: its turning rate follows J omega' +
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import lanes, load, store
 from mdstopo.mechanics.kinematics.spatial_poses import (
     D_RATE,
     FREEDOMS,
@@ -211,18 +212,40 @@ def _times_slopes(r, push, moment, out):
 
 @part
 def _pull_pose_back(r, inner, out):
-    """out (2 D, 2 D) = T^T inner, of the pose r (POSE,), by 3 x 3 blocks; inner (D, 2 D) may be out's first rows."""
-    for j in range(2 * FREEDOMS):
-        push = (inner[0, j], inner[1, j], inner[2, j])
-        moment = (inner[3, j], inner[4, j], inner[5, j])
-        move = turned(r, TURN_A, push)
-        first = minus(cross(push, vector_at(r, D)), moment)
-        second = turned_back(r, S, moment)
-        for i in range(3):
-            out[i, j] = -move[i]
-            out[3 + i, j] = first[i]
-            out[6 + i, j] = move[i]
-            out[9 + i, j] = second[i]
+    """out (2 D, 2 D) = T^T inner, of the pose r (POSE,), by 3 x 3 blocks; inner (D, 2 D) may be out's first rows.
+
+    A vector has a row of `inner` from column 0, 4 or the last one with room for it on, all read before any is written.
+    """
+    last = 2 * FREEDOMS - lanes()
+    columns = _columns(inner, 0)
+    others = _columns(inner, 4)
+    rest = _columns(inner, last)
+    _store_pulled(r, columns, 0, out)
+    _store_pulled(r, others, 4, out)
+    _store_pulled(r, rest, last, out)
+
+
+@part
+def _columns(inner, j):
+    """Of inner (D, 2 D) vectors of columns from j on: of the first three rows, of the others."""
+    return (
+        (load(inner[0], j), load(inner[1], j), load(inner[2], j)),
+        (load(inner[3], j), load(inner[4], j), load(inner[5], j)),
+    )
+
+
+@part
+def _store_pulled(r, columns, j, out):
+    """`_pull_pose_back` of columns from j on, as `_columns` has them."""
+    push, moment = columns
+    move = turned(r, TURN_A, push)
+    first = minus(cross(push, vector_at(r, D)), moment)
+    second = turned_back(r, S, moment)
+    for i in range(3):
+        store(out[i], j, -1.0 * move[i])
+        store(out[3 + i], j, first[i])
+        store(out[6 + i], j, move[i])
+        store(out[9 + i], j, second[i])
 
 
 @part
@@ -312,12 +335,19 @@ def _slopes_of_rates(r, t, n):
 @part
 def pair_matrix_vjp(model, p, m, z, bar):
     """bar -= m^T z; see `kinematics_interface.pair_matrix_vjp`."""
-    for i in range(2 * FREEDOMS):
-        body = model.pair[p, i // FREEDOMS]
-        value = z[FREEDOMS * body + i % FREEDOMS]
-        if value != 0.0:
-            for j in range(2 * FREEDOMS):
-                bar[FREEDOMS * model.pair[p, j // FREEDOMS] + j % FREEDOMS] -= m[i, j] * value
+    for side in range(2):
+        first = FREEDOMS * side
+        at = FREEDOMS * model.pair[p, side]
+        push = (0.0, 0.0, 0.0)
+        moment = (0.0, 0.0, 0.0)
+        for i in range(2):
+            own = FREEDOMS * model.pair[p, i]
+            for r in range(FREEDOMS):
+                row = m[FREEDOMS * i + r]
+                push = plus(push, times(z[own + r], vector_at(row, first)))
+                moment = plus(moment, times(z[own + r], vector_at(row, first + 3)))
+        put(bar, at, minus(vector_at(bar, at), push))
+        put(bar, at + 3, minus(vector_at(bar, at + 3), moment))
 
 
 @part

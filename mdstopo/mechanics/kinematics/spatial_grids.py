@@ -10,6 +10,10 @@ G = sum g n n^T are summed, of which the trace, sum g, spares one; and a with wh
 once. A vector of columns stays at hand over all rows of a tile, which stays in the first-level cache while many poses
 pass over it. All is summed in units of the stiffness k, which is not zero.
 
+Where rows are shorter than two vectors or so, a vector has members of several rows; after `period` vectors, when their
+members are whole rows, columns come again in the same lanes. Then such a vector of columns stays at hand
+(`short_sums`).
+
 Arguments: member (8 M,), the rows of `GeneralModel.member` behind each other, width M of each; start, count: the first
 member, and how many there are, without padding; length: members of a row, at least as many as a vector has; r (POSE,):
 the relative pose. The last vector of a row begins early enough to end with it, and its lanes that the vector before
@@ -214,22 +218,17 @@ def _sum_tile(member, width, scale, start, row, first, last, length, p, r, count
             square = dot(x, x)
             y = inverse_root(square, ZERO_LENGTH_SQUARED)
             stretch = _stretch(moved, x, square, y, load(member, L0 * width + at), load(member, EXCESS * width + at))
-            s = unmarked(load(scale, at), done)
+            s = where_larger(square, ZERO_LENGTH_SQUARED, unmarked(load(scale, at), done))
             elastic = s * stretch
             w = elastic * y
             if counted:
-                energy = energy + where_larger(square, ZERO_LENGTH_SQUARED, elastic * stretch)
+                energy = energy + elastic * stretch
             if not elastic_alone:
                 pull = plus(pull, times(w, x))
                 w = w + s * (preload + damping * (y * dot(x, vector_at(room[j], 3)))) * y
             push = plus(push, times(w, x))
             if tangent:
-                weight = weight + w
-                g = s - w
-                trace = trace + where_larger(square, ZERO_LENGTH_SQUARED, g)
-                along = times(g * (y * y), x)
-                two = two[0] + along[0] * x[0], two[1] + along[1] * x[1]
-                others = others[0] + along[1] * x[2], others[1] + along[2] * x[0], others[2] + along[0] * x[1]
+                weight, trace, two, others = _add_slope((weight, trace, two, others), x, y, s, w)
             at += length
         force = plus(force[0], push), plus(force[1], cross(a, push))
         if not elastic_alone:
@@ -237,16 +236,103 @@ def _sum_tile(member, width, scale, start, row, first, last, length, p, r, count
         if tangent:
             diagonal = two[0], two[1], trace - two[0] - two[1]
             stiffness = _add_column(stiffness, a, weight, push, diagonal, others)
-    add_totals(o, 0, force[0], -p[0])
-    add_totals(o, 3, force[1], -p[0])
-    if counted:
-        if elastic_alone:
-            slope = force
-        o[ENERGY] += 0.5 * p[0] * total(energy)
-        add_totals(o, PULL, slope[0], p[0])
-        add_totals(o, PULL + 3, slope[1], p[0])
+    if elastic_alone:
+        slope = force
+    _add_sums(p[0], energy, force, slope, counted, o)
     if tangent:
         _add_stiffness(stiffness, p[0], o)
+
+
+@part
+def _add_slope(sums, x, y, s, w):
+    """Sums over the members of columns, and those of members more: of w, g, and of G xx, yy and yz, zx, xy.
+
+    sums: so far. x, y: r and 1/L (m, 1/m). s, w: alpha^mu and f/L, 0 without length (1, 1/m).
+    """
+    weight, trace, two, others = sums
+    g = s - w
+    along = times(g * (y * y), x)
+    return (
+        weight + w,
+        trace + g,
+        (two[0] + along[0] * x[0], two[1] + along[1] * x[1]),
+        (others[0] + along[1] * x[2], others[1] + along[2] * x[0], others[2] + along[0] * x[1]),
+    )
+
+
+@kernel
+def short_sums(member, width, scale, start, stop, length, p, r, counted, tangent, o):
+    """`grid_sums` of undamped springs without preload at one pose, whatever the length of rows.
+
+    In:
+      member, width, scale, length: as above.
+      start, stop: the members meant in whole vectors, padding included, where scale is 0.
+      p (3 or more,): k, which is not zero, and two zeros.
+      r (POSE,): the relative pose.
+      counted: whether E and E_xi are wanted.
+      tangent: whether K is wanted.
+    Out:
+      o (SUMS,): Q, and on demand E, E_xi and K, added to.
+    """
+    origin = vector_at(r, D)
+    none = zero(), zero(), zero()
+    energy = zero()
+    force = none, none
+    stiffness = none, none, (none, none, none), (none, none, none)
+    step = period(length, lanes()) * lanes()
+    for first in range(start, min(start + step, stop), lanes()):
+        q = _rows(member, width, Q, first)
+        a = turned(r, S, q)
+        u = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, q))
+        moved = plus(u, u), dot(u, u)
+        push = none
+        weight = zero()
+        trace = zero()
+        two = zero(), zero()
+        others = none
+        for at in range(first, stop, step):
+            x = minus(a, minus(_rows(member, width, P, at), origin))
+            square = dot(x, x)
+            y = inverse_root(square, ZERO_LENGTH_SQUARED)
+            stretch = _stretch(moved, x, square, y, load(member, L0 * width + at), load(member, EXCESS * width + at))
+            s = where_larger(square, ZERO_LENGTH_SQUARED, load(scale, at))
+            elastic = s * stretch
+            w = elastic * y
+            if counted:
+                energy = energy + elastic * stretch
+            push = plus(push, times(w, x))
+            if tangent:
+                weight, trace, two, others = _add_slope((weight, trace, two, others), x, y, s, w)
+        force = plus(force[0], push), plus(force[1], cross(a, push))
+        if tangent:
+            diagonal = two[0], two[1], trace - two[0] - two[1]
+            stiffness = _add_column(stiffness, a, weight, push, diagonal, others)
+    _add_sums(p[0], energy, force, force, counted, o)
+    if tangent:
+        _add_stiffness(stiffness, p[0], o)
+
+
+@part
+def _add_sums(k, energy, force, slope, counted, o):
+    """Add k times sums over columns to o (SUMS,).
+
+    energy: of the energy. force: of forces and moments; slope: of elastic ones. counted: whether E and E_xi are wanted.
+    """
+    add_totals(o, 0, force[0], -k)
+    add_totals(o, 3, force[1], -k)
+    if counted:
+        o[ENERGY] += 0.5 * k * total(energy)
+        add_totals(o, PULL, slope[0], k)
+        add_totals(o, PULL + 3, slope[1], k)
+
+
+@part
+def period(length, count):
+    """After how many vectors of `count` members those of whole rows of so many are through."""
+    vectors = 1
+    while vectors * count % length != 0:
+        vectors += 1
+    return vectors
 
 
 @part
@@ -411,6 +497,50 @@ def _design_columns(member, width, start, row, begin, length, k, rel, pair, room
             work = work + stretch * y * dot(x, vector_at(room[j, m], 3))
         store(out, at, load(out, at) + k * unmarked(work, done))
         at += length
+
+
+@kernel
+def short_designs(member, width, start, stop, length, k, rel, u, pair, out):
+    """`grid_designs` whatever the length of rows.
+
+    In:
+      member, width, length, k, rel, u, pair: as of `grid_designs`.
+      start, stop: the members meant in whole vectors; padding becomes something that nobody reads.
+    Out:
+      out (M or more,): added to.
+    """
+    poses = rel.shape[0]
+    seen = np.empty((poses, SEEN + 3, lanes()))
+    step = period(length, lanes()) * lanes()
+    for first in range(start, min(start + step, stop), lanes()):
+        q = _rows(member, width, Q, first)
+        for m in range(poses):
+            r = rel[m, pair]
+            a = turned(r, S, q)
+            end = plus(a, vector_at(r, D))
+            moved = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, q))
+            change = plus(vector_at(u[m, pair], 0), cross(vector_at(u[m, pair], 3), a))
+            own = seen[m]
+            for c in range(3):
+                store(own[c], 0, end[c])
+                store(own[3 + c], 0, 2.0 * moved[c])
+                store(own[SEEN + c], 0, change[c])
+            store(own[6], 0, dot(moved, moved))
+        for at in range(first, stop, step):
+            p = _rows(member, width, P, at)
+            free = load(member, L0 * width + at)
+            excess = load(member, EXCESS * width + at)
+            work = zero()
+            for m in range(poses):
+                own = seen[m]
+                x = minus((load(own[0], 0), load(own[1], 0), load(own[2], 0)), p)
+                moved = (load(own[3], 0), load(own[4], 0), load(own[5], 0)), load(own[6], 0)
+                square = dot(x, x)
+                y = inverse_root(square, ZERO_LENGTH_SQUARED)
+                stretch = _stretch(moved, x, square, y, free, excess)
+                change = load(own[SEEN], 0), load(own[SEEN + 1], 0), load(own[SEEN + 2], 0)
+                work = work + stretch * y * dot(x, change)
+            store(out, at, load(out, at) + k * work)
 
 
 @kernel

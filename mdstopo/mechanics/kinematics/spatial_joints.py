@@ -1,22 +1,28 @@
 """Joints between two bodies in space. Every joint is a list of rows of four kinds (`row_of_joint`):
 
-    AT k       e_k . D           the points meet, along a global axis;    D = x_B + R_B c - x_A - R_A s
+    AT         D                 the points meet, three rows along global axes;    D = x_B + R_B c - x_A - R_A s
     ALONG i    (R_A n_i) . D     the points meet, along an axis of the first body's triad n
     ACROSS ij  (R_A n_i) . (R_B m_j)    an axis of the first body's triad stays perpendicular to one of the second's, m
     LINK       |D| - L
 
-The first three are sums of terms f = (R_A alpha) . (chi (x_B - x_A) + R_B beta), in which R_A or R_B may be absent.
-With z and y the second and first factor as seen from A and from B,
+ALONG and ACROSS are terms f = (R_A alpha) . (chi (x_B - x_A) + R_B beta), chi 1 and 0. With z and y the second and
+first factor as seen from A and from B,
 
     df/dq = (-chi a, alpha x z, chi a, beta x y),    a = R_A alpha
 
 and as omega is seen from the bodies, a' = R_A (omega_A x alpha): derivatives of f by time are terms of the same kind.
 So are their slopes.
+
+Of the rows AT, with y_A = R_A^T y and y_B = R_B^T y, and a second derivative by time of each body's part of D,
+
+    d(y . D)/dq = (-y, -s x y_A, y, c x y_B),      D'' = x_B'' - x_A'' + R_B c'' - R_A s'',
+    s'' = omega_A' x s + omega_A x (omega_A x s)
 """
 
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel, part
+from mdstopo.compiler.vector import lanes, load, store
 from mdstopo.mechanics.kinematics.spatial_lines import (
     add_column,
     add_line_stiffness,
@@ -42,6 +48,7 @@ from mdstopo.mechanics.kinematics.vectors import (
     minus,
     plus,
     put,
+    row_of,
     times,
     turned,
     turned_back,
@@ -51,6 +58,8 @@ from mdstopo.mechanics.kinematics.vectors import (
 
 #: codes of the joints, in the order of the case format
 SPHERICAL, REVOLUTE, UNIVERSAL, PRISMATIC, CYLINDRICAL, PLANAR, FIXED, DISTANCE = range(8)
+#: those by which points of both bodies meet
+AT_POINTS = (SPHERICAL, REVOLUTE, UNIVERSAL, FIXED)
 #: rows of each
 ROWS_OF = (3, 5, 4, 5, 4, 3, 6, 1)
 ROWS = 6
@@ -71,12 +80,18 @@ def rows_of(code):
 
 
 @part
+def rows_at_points(code):
+    """How many of the first rows are AT: 3 where points of both bodies meet, else 0."""
+    return 3 if code in AT_POINTS else 0
+
+
+@part
 def row_of_joint(code, r):
     """Kind of row r, the axis of the first body's triad (or the global axis), and that of the second's."""
     if code == DISTANCE:
         return LINK, 0, 0
     points = 0
-    if code in (SPHERICAL, REVOLUTE, UNIVERSAL, FIXED):
+    if code in AT_POINTS:
         points = 3
         if r < points:
             return AT, r, 0
@@ -98,10 +113,17 @@ def row_of_joint(code, r):
 @kernel
 def place_joint(model, j, q, turned, w):
     """Where the bodies of a joint are; see `kinematics_interface.place_joint`."""
-    for i in range(ATTITUDE):
-        w[ONE + i] = turned[model.joint[j, 1], i]
-        w[TWO + i] = turned[model.joint[j, 2], i]
+    _copy_attitude(turned[model.joint[j, 1]], w, ONE)
+    _copy_attitude(turned[model.joint[j, 2]], w, TWO)
     _place_between(model.home, model.joint[j, 1], model.joint[j, 2], q, w)
+
+
+@part
+def _copy_attitude(turned, w, at):
+    """w[at : at + ATTITUDE] = turned (ATTITUDE,); the last vector begins early enough to end with it."""
+    for begin in range(0, ATTITUDE, lanes()):
+        i = min(begin, ATTITUDE - lanes())
+        store(w, at + i, load(turned, i))
 
 
 @kernel
@@ -145,18 +167,14 @@ def _line(par, w):
 
 
 @part
-def add_term(w, alpha, free_a, between, beta, free_b, scale, row, r):
+def add_term(w, alpha, between, beta, scale, row, r):
     """row[r] (12,) += the slopes of scale (R_A alpha) . (between + R_B beta) by the turns of both bodies.
 
-    w (PLACES,): where the bodies are. alpha, beta: in their bodies' axes; global where free_a, free_b are False.
+    w (PLACES,): where the bodies are. alpha, beta: in their axes. between: global.
     """
-    a = turned(w, ONE + TURN, alpha) if free_a else alpha
-    b = turned(w, TWO + TURN, beta) if free_b else beta
-    if free_a:
-        x = cross(alpha, turned_back(w, ONE + TURN, plus(between, b)))
-        add(row[r], 3, times(scale, x))
-    if free_b:
-        add(row[r], 9, times(scale, cross(beta, turned_back(w, TWO + TURN, a))))
+    z = turned_back(w, ONE + TURN, plus(between, turned(w, TWO + TURN, beta)))
+    add(row[r], 3, times(scale, cross(alpha, z)))
+    add(row[r], 9, times(scale, cross(beta, turned_back(w, TWO + TURN, turned(w, ONE + TURN, alpha)))))
 
 
 @part
@@ -165,6 +183,19 @@ def add_places(w, alpha, row, r):
     a = turned(w, ONE + TURN, alpha)
     add(row[r], 0, times(-1.0, a))
     add(row[r], 6, a)
+
+
+@part
+def _fill_slopes(w, first, second, rows):
+    """rows[i] (12,), i < 3: slopes of component i of R_B second - R_A first by the turns of both bodies.
+
+    w (PLACES,): where the bodies are. first, second: vectors in their axes.
+    """
+    for i in range(3):
+        row = rows[i]
+        row[:] = 0.0
+        put(row, 3, cross(row_of(w, ONE + TURN, i), first))
+        put(row, 9, cross(second, row_of(w, TWO + TURN, i)))
 
 
 @kernel
@@ -181,7 +212,14 @@ def rows_at(code, par, w, phi, jac):
     c = vector_at(par, SECOND_POINT)
     none = (0.0, 0.0, 0.0)
     between = vector_at(w, BETWEEN)
-    for r in range(rows_of(code)):
+    points = rows_at_points(code)
+    if points > 0:
+        put(phi, 0, _apart(par, w))
+        _fill_slopes(w, s, c, jac)
+        for i in range(points):
+            jac[i, i] = -1.0
+            jac[i, 6 + i] = 1.0
+    for r in range(points, rows_of(code)):
         kind, i, k = row_of_joint(code, r)
         row = jac[r]
         row[:] = 0.0
@@ -193,24 +231,16 @@ def rows_at(code, par, w, phi, jac):
             off = dot(home, home) - par[LENGTH] * par[LENGTH] + dot(u, plus(u, times(2.0, home)))
             phi[r] = off / (length + par[LENGTH])
             line_row(w, ONE, w, TWO, s, c, e, row, 0)
-        elif kind == AT:
-            d = _apart(par, w)
-            e = unit(i)
-            phi[r] = dot(d, e)
-            add_term(w, e, False, none, c, True, 1.0, jac, r)
-            add_term(w, s, True, none, e, False, -1.0, jac, r)
-            row[i] = -1.0
-            row[6 + i] = 1.0
         elif kind == ALONG:
             n = vector_at(par, FIRST_AXES + 3 * i)
             phi[r] = dot(turned(w, ONE + TURN, n), _apart(par, w))
-            add_term(w, n, True, between, c, True, 1.0, jac, r)
+            add_term(w, n, between, c, 1.0, jac, r)
             add_places(w, n, jac, r)
         else:
             n = vector_at(par, FIRST_AXES + 3 * i)
             m = vector_at(par, SECOND_AXES + 3 * k)
             phi[r] = dot(turned(w, ONE + TURN, n), turned(w, TWO + TURN, m))
-            add_term(w, n, True, none, m, True, 1.0, jac, r)
+            add_term(w, n, none, m, 1.0, jac, r)
 
 
 @part
@@ -230,16 +260,16 @@ def joint_gamma(model, j, w, wd, gamma):
     omega_b = vector_at(wd, 9)
     still = (0.0, 0.0, 0.0)
     velocity = minus(vector_at(wd, 6), vector_at(wd, 0))
-    for r in range(rows_of(code)):
+    points = rows_at_points(code)
+    if points > 0:
+        one = cross(omega_a, cross(omega_a, s))
+        two = cross(omega_b, cross(omega_b, c))
+        put(gamma, 0, minus(turned(w, TWO + TURN, two), turned(w, ONE + TURN, one)))
+    for r in range(points, rows_of(code)):
         kind, i, k = row_of_joint(code, r)
         if kind == LINK:
             _, e, length = _line(par, w)
             gamma[r] = line_bias(w, ONE, w, TWO, s, c, e, length, wd, 0, FREEDOMS)
-        elif kind == AT:
-            x = minus(
-                turned(w, TWO + TURN, _second(omega_b, still, c)), turned(w, ONE + TURN, _second(omega_a, still, s))
-            )
-            gamma[r] = x[0] if i == 0 else x[1] if i == 1 else x[2]
         else:
             n = vector_at(par, FIRST_AXES + 3 * i)
             m = c
@@ -267,29 +297,28 @@ def joint_velocity_slope(model, j, w, wd, out):
     omega_b = vector_at(wd, 9)
     none = (0.0, 0.0, 0.0)
     velocity = minus(vector_at(wd, 6), vector_at(wd, 0))
-    for r in range(rows_of(code)):
+    points = rows_at_points(code)
+    if points > 0:
+        _fill_slopes(w, cross(omega_a, s), cross(omega_b, c), out)
+    for r in range(points, rows_of(code)):
         kind, i, k = row_of_joint(code, r)
         row = out[r]
         row[:] = 0.0
         if kind == LINK:
             _, e, length = _line(par, w)
             line_rate_slopes(w, ONE, w, TWO, s, c, e, length, wd, 0, FREEDOMS, row)
-        elif kind == AT:
-            e = unit(i)
-            add_term(w, e, False, none, cross(omega_b, c), True, 1.0, out, r)
-            add_term(w, cross(omega_a, s), True, none, e, False, -1.0, out, r)
         else:
             n = vector_at(par, FIRST_AXES + 3 * i)
             m = c if kind == ALONG else vector_at(par, SECOND_AXES + 3 * k)
             n_rate = cross(omega_a, n)
             m_rate = cross(omega_b, m)
             if kind == ALONG:
-                add_term(w, n_rate, True, vector_at(w, BETWEEN), m, True, 1.0, out, r)
+                add_term(w, n_rate, vector_at(w, BETWEEN), m, 1.0, out, r)
                 add_places(w, n_rate, out, r)
-                add_term(w, n, True, velocity, m_rate, True, 1.0, out, r)
+                add_term(w, n, velocity, m_rate, 1.0, out, r)
             else:
-                add_term(w, n_rate, True, none, m, True, 1.0, out, r)
-                add_term(w, n, True, none, m_rate, True, 1.0, out, r)
+                add_term(w, n_rate, none, m, 1.0, out, r)
+                add_term(w, n, none, m_rate, 1.0, out, r)
 
 
 @kernel
@@ -301,8 +330,15 @@ def joint_acceleration_slopes(model, j, w, wd, wdd, by_q, by_v):
     c = vector_at(par, SECOND_POINT)
     omega_a = vector_at(wd, 3)
     omega_b = vector_at(wd, 9)
-    none = (0.0, 0.0, 0.0)
-    for r in range(rows_of(code)):
+    points = rows_at_points(code)
+    if points > 0:
+        _fill_slopes(w, _second(omega_a, vector_at(wdd, 3), s), _second(omega_b, vector_at(wdd, 9), c), by_q)
+        for i in range(points):
+            rate = by_v[i]
+            rate[:] = 0.0
+            put(rate, 3, times(-1.0, _centripetal_slope(s, omega_a, row_of(w, ONE + TURN, i))))
+            put(rate, 9, _centripetal_slope(c, omega_b, row_of(w, TWO + TURN, i)))
+    for r in range(points, rows_of(code)):
         kind, i, k = row_of_joint(code, r)
         row = by_q[r]
         rate = by_v[r]
@@ -311,14 +347,6 @@ def joint_acceleration_slopes(model, j, w, wd, wdd, by_q, by_v):
         if kind == LINK:
             _, e, length = _line(par, w)
             line_slopes(w, ONE, w, TWO, s, c, e, length, wd, wdd, 0, FREEDOMS, row, rate)
-        elif kind == AT:
-            e = unit(i)
-            add_term(w, e, False, none, _second(omega_b, vector_at(wdd, 9), c), True, 1.0, by_q, r)
-            add_term(w, _second(omega_a, vector_at(wdd, 3), s), True, none, e, False, -1.0, by_q, r)
-            y = turned_back(w, TWO + TURN, e)
-            add(rate, 9, _centripetal_slope(c, omega_b, y))
-            y = turned_back(w, ONE + TURN, e)
-            add(rate, 3, times(-1.0, _centripetal_slope(s, omega_a, y)))
         else:
             _slopes_along(kind == ALONG, par, i, k, w, wd, wdd, by_q, by_v, r)
 
@@ -351,11 +379,11 @@ def _slopes_along(moves, par, i, k, w, wd, wdd, by_q, by_v, r):
     m_rate = cross(omega_b, m)
     n_second = _second(omega_a, vector_at(wdd, 3), n)
     m_second = _second(omega_b, vector_at(wdd, 9), m)
-    add_term(w, n_second, True, between, m, True, 1.0, by_q, r)
+    add_term(w, n_second, between, m, 1.0, by_q, r)
     if moves:
         add_places(w, n_second, by_q, r)
-    add_term(w, n_rate, True, velocity, m_rate, True, 2.0, by_q, r)
-    add_term(w, n, True, acceleration, m_second, True, 1.0, by_q, r)
+    add_term(w, n_rate, velocity, m_rate, 2.0, by_q, r)
+    add_term(w, n, acceleration, m_second, 1.0, by_q, r)
     # by velocities: of a'' . z + 2 a' . z' + a . z''
     z = turned_back(w, ONE + TURN, plus(between, turned(w, TWO + TURN, m)))
     z_rate = turned_back(w, ONE + TURN, plus(velocity, turned(w, TWO + TURN, m_rate)))
@@ -378,7 +406,15 @@ def joint_stiffness(model, j, w, lam, k):
     s = vector_at(par, FIRST_POINT)
     c = vector_at(par, SECOND_POINT)
     none = (0.0, 0.0, 0.0)
-    for r in range(rows_of(code)):
+    points = rows_at_points(code)
+    if points > 0:
+        one = turned_back(w, ONE + TURN, vector_at(lam, 0))
+        two = turned_back(w, TWO + TURN, vector_at(lam, 0))
+        for d in range(3):
+            axis = unit(d)
+            add_column(k, 3, 3 + d, cross(s, cross(axis, one)))
+            add_column(k, 9, 9 + d, cross(c, cross(two, axis)))
+    for r in range(points, rows_of(code)):
         kind, i, m = row_of_joint(code, r)
         f = lam[r]
         if f == 0.0:
@@ -386,14 +422,6 @@ def joint_stiffness(model, j, w, lam, k):
         if kind == LINK:
             _, e, length = _line(par, w)
             add_line_stiffness(w, ONE, w, TWO, s, c, e, length, f, k)
-        elif kind == AT:
-            e = unit(i)
-            seen_one = turned_back(w, ONE + TURN, e)
-            seen_two = turned_back(w, TWO + TURN, e)
-            for d in range(3):
-                axis = unit(d)
-                add_column(k, 3, 3 + d, times(-f, cross(s, cross(seen_one, axis))))
-                add_column(k, 9, 9 + d, times(f, cross(c, cross(seen_two, axis))))
         elif kind == ALONG:
             _stiffness_along(w, vector_at(par, FIRST_AXES + 3 * i), vector_at(w, BETWEEN), c, True, f, k)
         else:
@@ -429,13 +457,37 @@ def _stiffness_along(w, n, between, m, moves, f, k):
 
 @part
 def joint_is_point(model, j):
-    """No joint in space has a shorter way (`kinematics_interface.point_joint_vjp`)."""
-    return False
+    """A joint whose rows are AT alone (`kinematics_interface.point_joint_vjp`)."""
+    return model.joint[j, 0] == SPHERICAL
 
 
 @part
 def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
-    """Not called: `joint_is_point` is never true; see `kinematics_interface.point_joint_vjp`."""
+    """What turns do to D'' and to the multipliers' moments; see `kinematics_interface.point_joint_vjp`.
+
+    With y_A = R_A^T y and l_A = R_A^T lam, -z . (s x l_A) has the slope (z x s) x l_A, and y . R_A s'' has s'' x y_A.
+    """
+    par = model.joint_par[j]
+    s = vector_at(par, FIRST_POINT)
+    c = vector_at(par, SECOND_POINT)
+    one = FREEDOMS * model.joint[j, 1] + 3
+    two = FREEDOMS * model.joint[j, 2] + 3
+    own = (
+        y[model.row[j, 0]] if model.row[j, 0] >= 0 else 0.0,
+        y[model.row[j, 1]] if model.row[j, 1] >= 0 else 0.0,
+        y[model.row[j, 2]] if model.row[j, 2] >= 0 else 0.0,
+    )
+    pull = vector_at(lam, 0)
+    seen = turned_back(w, ONE + TURN, own)
+    omega = vector_at(wd, 3)
+    turning = cross(cross(vector_at(z, one), s), turned_back(w, ONE + TURN, pull))
+    add(bar_q, one, plus(turning, cross(_second(omega, vector_at(wdd, 3), s), seen)))
+    add(bar_v, one, _centripetal_slope(s, omega, seen))
+    seen = turned_back(w, TWO + TURN, own)
+    omega = vector_at(wd, 9)
+    turning = cross(turned_back(w, TWO + TURN, pull), cross(vector_at(z, two), c))
+    add(bar_q, two, plus(turning, cross(seen, _second(omega, vector_at(wdd, 9), c))))
+    add(bar_v, two, times(-1.0, _centripetal_slope(c, omega, seen)))
 
 
 @entry

@@ -17,7 +17,14 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.padding import whole_vectors
 from mdstopo.mechanics.kinematics.spatial_forces import C, K
-from mdstopo.mechanics.kinematics.spatial_grids import THREADS, grid_designs, grid_far, grid_sums
+from mdstopo.mechanics.kinematics.spatial_grids import (
+    THREADS,
+    grid_designs,
+    grid_far,
+    grid_sums,
+    short_designs,
+    short_sums,
+)
 from mdstopo.mechanics.kinematics.spatial_lines import (
     NO_LENGTH,
     add_line_stiffness,
@@ -234,13 +241,16 @@ def spring_sums_at_poses(model, p, start, count, row, counted, member_state, rel
     rows = model.member.reshape(model.member.size)
     scale = member_state.reshape(member_state.size)
     grid = row > 0 and p[0] != 0.0
+    short = row < 0 and p[0] != 0.0 and p[1] == 0.0 and p[2] == 0.0
     if grid:
         threads = model.size[THREADS] if count >= MANY else np.int64(1)
         grid_sums(rows, width, scale, start, count, row, p, rel, pair, poses, np.bool_(counted), tangent, threads, sums)
     for j in range(poses):
         r = rel[j, pair]
         o = sums[j, pair]
-        if not grid:
+        if short:
+            short_sums(rows, width, scale, start, stop, -row, p, r, np.bool_(counted), tangent, o)
+        elif not grid:
             alike_sums(rows, width, scale, start, stop, p, r, counted, o)
             if tangent:
                 alike_tangent(rows, width, scale, start, stop, p, r, o)
@@ -276,6 +286,8 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     if row > 0:
         threads = model.size[THREADS] if count >= MANY else np.int64(1)
         grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, threads, out)
+    elif row < 0:
+        short_designs(rows, width, lo, lo + whole_vectors(count), -row, p[0], rel, u, pair, out)
     else:
         elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
 

@@ -280,7 +280,8 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
     """The cotangent of the accelerations of stage j; see `kinematics_interface.stage_vjp`.
 
     The turning parts of u and g of the stage behind j, which nobody reads any more, become bar t and bar omega. Until
-    stage 0 comes, bar t_end waits in its place in u, which is 0 before and after.
+    stage 0 comes, bar t_end waits in its place in u, which is 0 before and after; that of lam_q, from which it follows,
+    becomes the cotangent of the turn of the start by all that comes behind stage j.
     """
     s, n = u.shape
     by_end = h * h * table[VECTORS, END, j]
@@ -289,12 +290,12 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
         c = COORDINATES * body
         d = FREEDOMS * body
         if j + 1 == s:
-            end_turn = _end_turn(table, s, h, q, v, c, d)
-            put(u[0], d + 3, turn_rate(times(-1.0, end_turn), vector_at(lam_q, d + 3)))
+            back = times(-1.0, _end_turn(table, s, h, q, v, c, d))
+            seen = vector_at(lam_q, d + 3)
+            put(u[0], d + 3, turn_rate(back, seen))
+            put(lam_q, d + 3, back_turned(back, seen))
         else:
-            _stage_bars(table, h, j + 1, q, v, vector_at(u[0], d + 3), u, g, c, d)
-        if j == 0:
-            put(u[0], d + 3, (0.0, 0.0, 0.0))
+            _stage_bars(table, h, j + 1, q, v, lam_q, u, g, c, d)
         place = plus(times(by_end, vector_at(lam_q, d)), times(by_end_rate, vector_at(lam_v, d)))
         turn = times(by_end_rate, vector_at(lam_v, d + 3))
         for i in range(j + 1, s):
@@ -305,37 +306,35 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
                 turn = plus(turn, times(by_rate, vector_at(g[i], d + 3)))
         put(z, d, place)
         put(z, d + 3, turn)
+        if j == 0:  # its own turn is none, so bar omega_0 is bar k_0
+            add(lam_v, d + 3, _slope_bar(table, s, h, 0, u, d, vector_at(u[0], d + 3)))
+            put(u[0], d + 3, (0.0, 0.0, 0.0))
 
 
 @part
-def _stage_bars(table, h, i, q, v, end_bar, u, g, c, d):
+def _stage_bars(table, h, i, q, v, lam_q, u, g, c, d):
     """Cotangents of a turn and a turning rate, in u and g (s, n) of stage i, become bar t and bar omega.
 
-    table, h, q (s, n_q), v (s, n): as of `stage_vjp`. end_bar: bar t_end. c, d: where the body begins.
+    u_i seen before the turn, exp(t) u_i = exp(t) J(t)^-T (J(t)^T u_i) = J(t)^-1 (J(t)^T u_i), is added to lam_q.
+
+    table, h, q (s, n_q), v (s, n), lam_q (n,): as of `stage_vjp`. c, d: where the body begins.
     """
     t = turn_between(quaternion_at(q[0], c + 3), quaternion_at(q[i], c + 3))
-    bar = _slope_bar(table, u.shape[0], h, i, u, d, end_bar)
-    own = plus(turn_rate(times(-1.0, t), vector_at(u[i], d + 3)), vector_rate_vjp(t, vector_at(v[i], d + 3), bar))
-    put(u[i], d + 3, own)
+    bar = _slope_bar(table, u.shape[0], h, i, u, d, vector_at(u[0], d + 3))
+    own = turn_rate(times(-1.0, t), vector_at(u[i], d + 3))
+    put(u[i], d + 3, plus(own, vector_rate_vjp(t, vector_at(v[i], d + 3), bar)))
     add(g[i], d + 3, vector_rate(times(-1.0, t), bar))
+    add(lam_q, d + 3, vector_rate(t, own))
 
 
 @kernel
 def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
     """The cotangents of the start of a step; see `kinematics_interface.start_vjp`.
 
-    A turn of the start is seen behind each stage's turn, and behind the end's. Of u the turning parts of the stages
-    behind the first are bar t by now (`stage_vjp`): J(t)^T u_i is what is left of them without k_i's part.
+    Of turns, what stage 0 adds is left (`stage_vjp`); of turning rates, what all stages' bar omega add.
     """
     for body in range(lam_q.shape[0] // FREEDOMS):
-        c = COORDINATES * body
         d = FREEDOMS * body
-        start = quaternion_at(q[0], c + 3)
-        end_turn = _end_turn(table, s, h, q, v, c, d)
-        seen = vector_at(lam_q, d + 3)
-        end_bar = turn_rate(times(-1.0, end_turn), seen)
-        _stage_bars(table, h, 0, q, v, end_bar, u, g, c, d)
-        turn = back_turned(times(-1.0, end_turn), seen)
         place = vector_at(lam_q, d)
         velocity = plus(vector_at(lam_v, d), times(h, place))
         omega = vector_at(lam_v, d + 3)
@@ -345,14 +344,9 @@ def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
             place = plus(place, move)
             velocity = plus(velocity, plus(times(ahead, move), vector_at(g[i], d)))
             omega = plus(omega, vector_at(g[i], d + 3))
-            t = turn_between(start, quaternion_at(q[i], c + 3))
-            bar = _slope_bar(table, s, h, i, u, d, end_bar)
-            own = minus(vector_at(u[i], d + 3), vector_rate_vjp(t, vector_at(v[i], d + 3), bar))
-            # own = J(t)^T u_i; u_i seen before the turn is exp(t) u_i = exp(t) J(t)^-T own = J(t)^-1 own
-            turn = plus(turn, vector_rate(t, own))
         put(lam_q, d, place)
         put(lam_v, d, velocity)
-        put(lam_q, d + 3, turn)
+        add(lam_q, d + 3, vector_at(u[0], d + 3))
         put(lam_v, d + 3, omega)
 
 
