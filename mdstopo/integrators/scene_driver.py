@@ -202,7 +202,7 @@ class DriverOptions:
     method: the integrator. tolerance: relative error that objectives and gradients may have. step: fixed step (s); 0:
     adaptive steps; negative: see `generalized_alpha.longest_step`. looked: what is looked at, objectives first. design
     (N + P,): the array that every design is put in, shared with whoever gives designs. beside: another process that may
-    be compiling what evaluates responses.
+    be compiling what evaluates responses. fits: whether joints are to fit at the start, which a kernel finds out.
     """
 
     method: Method
@@ -211,3 +211,4 @@ class DriverOptions:
     looked: Sequence[Objective | ResponseRow]
     design: FloatArray
     beside: Compiling | None = None
+    fits: bool = True
