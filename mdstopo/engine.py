@@ -388,14 +388,10 @@ class Evaluator:
     def _choice(self) -> tuple[str, str]:
         """The integrator, and why; where `auto` would take explicit steps, their motions from the case's start tell."""
         usual = self._usual
-        chooses = self.case.solver.integrator == AUTO and self.case.solver.step is None
-        if not chooses or usual[0] != ADAPTIVE or self.case.dimension > 2:
+        if not self.may_simulate_to_choose:
             return usual
         from mdstopo.general.stiffness import held_short
-        from mdstopo.general.variables import has_damping
 
-        if not has_damping(self.case):
-            return usual
         explicit = method_of(ADAPTIVE, self.case.solver)
         drivers = {
             load_case: self._made(load_case, explicit) for load_case, looked in self._by_load_case.items() if looked
@@ -416,17 +412,33 @@ class Evaluator:
         return self._drivers[name]
 
     def compile_responses(self) -> None:
-        """Have the machine code on the disk that looks back at steps, without any steps (`SceneDriver`).
+        """Have the machine code on the disk that looks back at steps, without any steps (`SceneDriver`)."""
+        self._unused().compile_responses()
 
-        `auto` is not asked whether these steps serve: it would simulate, which another process is compiling.
-        """
-        self._made(next(iter(self.scenes)), method_of(self._usual[0], self.case.solver)).compile_responses()
+    def compile_steps(self) -> None:
+        """Have the machine code on the disk that makes steps of a scene with joints or other laws, without any."""
+        cast("GeneralDriver", self._unused()).compile_steps()
 
-    def _made(self, name: str, method: Method) -> SceneDriver:
-        """A driver of one load case by a method."""
+    def _unused(self) -> SceneDriver:
+        """A driver to compile with. Nothing is computed, which would need what another process is compiling: neither
+        whether joints fit, nor whether the steps serve that `auto` takes."""
+        return self._made(next(iter(self.scenes)), method_of(self._usual[0], self.case.solver), fits=False)
+
+    @property
+    def may_simulate_to_choose(self) -> bool:
+        """Whether `auto` simulates the case's start to choose an integrator."""
+        chooses = self.case.solver.integrator == AUTO and self.case.solver.step is None
+        if not chooses or self._usual[0] != ADAPTIVE or self.case.dimension > 2:
+            return False
+        from mdstopo.general.variables import has_damping
+
+        return has_damping(self.case)
+
+    def _made(self, name: str, method: Method, fits: bool = True) -> SceneDriver:
+        """A driver of one load case by a method; fits: as of `DriverOptions`."""
         solver, looked = self.case.solver, tuple(self._by_load_case[name].values())
         tolerance, step = _of_motion(solver.tolerance), solver.step or 0.0
-        options = DriverOptions(method, tolerance, step, looked, self._design.values, self._beside)
+        options = DriverOptions(method, tolerance, step, looked, self._design.values, self._beside, fits)
         driver = self._family.driver(self._near, self.scenes[name], options)
         if method.kind.finds_step and solver.step is None:
             from mdstopo.integrators.default_step import default_step

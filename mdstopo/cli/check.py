@@ -111,8 +111,12 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
     document: dict[str, Any] = {"uncertainty": say_sample(output, case)}
     announce_compilation(output, case)
     from mdstopo.evaluators import evaluator_of
+    from mdstopo.session.compiling_apart import STEPS, compiled_beside
 
-    engine = evaluator_of(case, beside=False)
+    with compiled_beside(case, STEPS):
+        engine = evaluator_of(case, beside=False)
+        found = frequencies(case, engine)
+        integrator = engine.integrator
     freedoms = {name: engine.degrees_of_freedom(name) for name in engine.scenes}
     for name, freedom in freedoms.items():
         output.say(f"load case {name}: {freedom} degrees of freedom")
@@ -120,7 +124,6 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
         if redundant:
             output.say(f"load case {name}: joints with rows that others imply: {', '.join(redundant)}")
     document["degrees_of_freedom"] = max(freedoms.values())
-    found = frequencies(case, engine)
     for name in freedoms:
         rest = engine.settled(case.initial, name)
         if rest is not None:
@@ -130,8 +133,8 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
     output.say("left out, because nothing asks for it")
     for sentence in engine.skipped or ("nothing",):
         output.say(f"  {sentence}")
-    output.table([["integrator", f"{engine.integrator}: {engine.integrator_reason}"]], indent="")
-    document |= {"frequencies": found, "skipped": engine.skipped, "integrator": engine.integrator}
+    output.table([["integrator", f"{integrator}: {engine.integrator_reason}"]], indent="")
+    document |= {"frequencies": found, "skipped": engine.skipped, "integrator": integrator}
     document["evaluation"] = _say_cost(output, case, engine)
     return document
 

@@ -59,21 +59,23 @@ def _spared() -> Iterator[None]:
 
     They would cost 0.2 s. Elsewhere Numba may serve others too.
     """
+    if not tried.is_our_process() or "numba" in sys.modules:
+        yield
+        return
     spared = {"scipy", "cffi"} - sys.modules.keys()
-    if not tried.is_our_process() or "numba" in sys.modules or len(spared) < 2:
+    if len(spared) < 2:
         spared = set()
     stated = os.environ.get(_PLAIN)
+    os.environ[_PLAIN] = "1"
     for name in spared:
         sys.modules[name] = None  # type: ignore[assignment]  # an import of it now fails, which Numba allows for
-        os.environ[_PLAIN] = "1"
     try:
         yield
     finally:
         for name in spared:
             del sys.modules[name]
-        if spared:
-            del os.environ[_PLAIN]
-        if spared and stated is not None:
+        del os.environ[_PLAIN]
+        if stated is not None:
             os.environ[_PLAIN] = stated
 
 

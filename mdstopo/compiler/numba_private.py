@@ -19,12 +19,13 @@ import os
 import pickle
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from types import CodeType, MappingProxyType
+from types import BuiltinFunctionType, CodeType, FunctionType, MappingProxyType, ModuleType
 from typing import Any
 
 import numba
 import numba.core.typing.cffi_utils  # here, while cffi and scipy are spared: see `kernel`
 import numba.np.arraymath
+import numba.np.arrayobj
 import numpy as np
 from llvmlite import binding as llvm
 from llvmlite import ir as llvm_ir
@@ -34,6 +35,7 @@ from numba.core import (
     analysis,
     base,
     cgutils,
+    consts,
     cpu_options,
     errors,
     ir,
@@ -62,7 +64,7 @@ from numba.core.typed_passes import AnnotateTypes, BaseNativeLowering, NativeLow
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.core.untyped_passes import InlineClosureLikes
 from numba.experimental.structref import _Utils as _Structure
-from numba.extending import lower_builtin
+from numba.extending import lower_builtin, overload
 from numba.np.arrayobj import fix_integer_index, load_item, store_item
 
 from mdstopo.compiler import threads, units
@@ -446,15 +448,16 @@ if not _LEAN:
 #
 # Numba makes machine code of every function, and optimises each with all that it calls. Here only entries are called
 # from outside. What an entry reaches is linked into it once, and a function at body level (`jit.kernel`) is optimised
-# there only. In entries for scenes with joints and other laws, long functions have machine code of their own, which all
-# these entries share. A loop over members is optimised by itself, so that its vectors do not depend on who calls it.
-# Loops of entries are not unrolled.
+# there; before, one of `general` is only made short. In entries for scenes with joints and other laws, long functions
+# have machine code of their own, which all these entries share. A loop over members is optimised by itself, so that its
+# vectors do not depend on who calls it, and once more where it is linked in; in the modules `units.STAYING` it stays as
+# it is. Loops of entries are not unrolled.
 
 
 class Optimised(JITCodeLibrary):
-    """Intermediate code of a function with all that it calls, optimised.
+    """Intermediate code of a function with all that it calls, optimised, but for long ones that have been optimised.
 
-    split: long functions that it calls are left out, and called by their symbols (`units`).
+    split: all long functions that it calls are left out, and called by their symbols (`units`).
     """
 
     split = False
@@ -496,7 +499,10 @@ class Optimised(JITCodeLibrary):
         self._ensure_finalized()
         if self._unit is None:
             units.share(self._final_module, self._symbol)
-            self._unit = units.Unit(self._symbol, self._final_module.as_bitcode(), self.apart.values())
+            is_done = units.is_of(self._symbol, units.STAYING)
+            is_done = is_done and units.is_long(self._size, self._symbol, self._inlined)
+            bitcode = self._final_module.as_bitcode()
+            self._unit = units.Unit(self._symbol, bitcode, self.apart.values(), is_done, is_done=is_done)
         return self._unit
 
     def _finalize_final_module(self) -> None:
@@ -518,7 +524,7 @@ class Optimised(JITCodeLibrary):
         """All of it, for libraries that are not ours."""
         if self._shared_module is None:
             self._shared_module = self.unit.module.clone()
-            units.link(self._shared_module, self.unit.needs, split=False)
+            units.complete(self._shared_module, self.unit.needs)
             self._shared_module.get_function(self.unit.symbol).linkage = "linkonce_odr"
         return self._shared_module
 
@@ -546,10 +552,28 @@ class Left(Optimised):
         is_long = units.is_long(self._size, self._symbol, self._inlined)
         self.take_unit(units.Unit(self._symbol, self._final_module.as_bitcode(), self._needs(), is_long))
 
-    @property
+    @functools.cached_property
     def has_dynamic_globals(self) -> bool:
         """Whether it, or anything that it calls, holds the address of something in this process."""
         return bool(self._dynamic_globals) or any(each.has_dynamic_globals for each in self._linking_libraries)
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """At body level have no more than what makes a function short: all else is done where it is linked in.
+
+        What loops over members may hold keeps Numba's passes, because the order of their sums may depend on these.
+        """
+        if not _LEAN or not units.is_of(self._symbol, (units.SPLIT,)):
+            super()._optimize_functions(ll_module)
+            return
+        target: Any = self._codegen
+        ll_module.data_layout = target._data_layout
+        short, builder = llvm.create_new_function_pass_manager(), target._pass_builder()
+        short.add_sroa_pass()
+        short.add_instruction_combine_pass()
+        short.add_simplify_cfg_pass()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                short.run(function, builder)
 
 
 def _unit_of(library: Any) -> units.Unit:
@@ -962,6 +986,20 @@ def _jit_without_code(*given: Any, **options: Any) -> Any:
     return numba.jit(*given, **{"no_cfunc_wrapper": True, "pipeline_class": _LEFT, "_target": _TARGET, **options})
 
 
+def _enter_sizes() -> None:
+    """What is said where a part of an array is given numbers of another size, without the sizes: how they are written
+    would be compiled in every process."""
+
+    def without(given: Any, place: Any) -> Any:
+        def impl(given: Any, place: Any) -> None:
+            raise ValueError("cannot assign slice from input of different size")
+
+        return impl
+
+    arrays: Any = numba.np.arrayobj
+    overload(arrays.raise_with_shape_context, target=_TARGET)(without)
+
+
 def _enter_target() -> None:
     target_registry[_TARGET] = _Target
     dispatcher_registry[_Target] = _Dispatcher
@@ -1039,6 +1077,21 @@ def _spare_variables() -> None:
     instruction._rec_list_vars = variables
 
 
+def _spare_globals() -> None:
+    """A function or module that a kernel names is looked for first among those that Numba knows: it is nothing else."""
+    context: Any = _Dispatcher.targetdescr.typing_context
+    ask, known = context.resolve_value_type, context._get_global_type
+
+    def resolve(value: Any) -> Any:
+        if isinstance(value, (FunctionType, BuiltinFunctionType, ModuleType)) and not hasattr(value, "_numba_type_"):
+            found = known(value)
+            if found is not None:
+                return found
+        return ask(value)
+
+    context.resolve_value_type = resolve
+
+
 def _spare_lifetimes() -> None:
     """After most passes over a function nobody asks which variables live where: it is found out when somebody does."""
     processor: Any = postproc.PostProcessor
@@ -1054,6 +1107,21 @@ def _spare_lifetimes() -> None:
         function.generator_info = None
 
     processor.run = run
+
+
+def _spare_failures() -> None:
+    """Numba asks of every index whether it is constant, and is told by an error where it is not: one that is no text
+    with the lines of the source."""
+
+    def begin(self: Any, value: Any, loc: Any = None) -> None:
+        Exception.__init__(self, value)
+        self.msg, self.loc = value, loc
+
+    def fail(_self: Any, value: Any) -> Any:
+        raise _ERRORS.ConstantInferenceError(value)
+
+    inference: Any = consts.ConstantInference
+    _ERRORS.ConstantInferenceError.__init__, inference._fail = begin, fail
 
 
 def _spare_classes() -> None:
@@ -1168,7 +1236,7 @@ class _Passes(PassManager):
 
     def _runPass(self, index: int, each: Any, state: Any) -> None:
         each.analysis = self._analysis
-        with global_compiler_lock, _ERRORS.new_error_context("Pass {name}", name=each.name()):
+        with _ERRORS.new_error_context("Pass {name}", name=each.name()):
             changed = [step(state) for step in (each.run_initialization, each.run_pass, each.run_finalizer)]
         if not _pass_registry.get(each.__class__).mutates_CFG:
             return
@@ -1181,10 +1249,13 @@ class _Passes(PassManager):
 _enter_target()
 _name_flags_in_order()
 if _LEAN:
+    _enter_sizes()
     _remember_signatures()
     _spare_flags()
     _spare_variables()
     _spare_lifetimes()
+    _spare_failures()
+    _spare_globals()
     _spare_classes()
     _spare_contexts()
     _spare_places()
@@ -1398,6 +1469,9 @@ def _built(dispatcher: Any, arguments: tuple[Any, ...], letters: str) -> Code | 
     compiled = dispatcher.overloads[arguments]
     result = _result(compiled.signature.return_type)
     library = compiled.library
+    if not library.split:
+        units.complete(library._final_module, library.apart.values())
+        library.apart = {}
     if result is None or _missing(library._final_module, library.apart):
         return None
     needs = _made_apart(library)
@@ -1436,7 +1510,8 @@ def _made_apart(library: Any) -> tuple[str, ...] | None:
         made = Split(library._codegen, "apart")
         made._final_module.link_in(unit.module, preserve=True)
         made.apart = units.link(made._final_module, unit.needs, split=True)
-        made._optimize_final_module()
+        if not unit.is_done:
+            made._optimize_final_module()
         made._final_module.verify()
         if _missing(made._final_module, made.apart):
             return None

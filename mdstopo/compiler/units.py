@@ -21,21 +21,30 @@ SPLIT = "mdstopo.general."
 #: instructions, as written for LLVM, from which on a function is long. LLVM inlines functions of some fifty, when what
 #: can be done away with is gone; so what is called by its symbol instead loses nothing
 LONG = 400
+#: modules of deep calls, whose long functions would else be optimised once more with everyone that calls them
+STAYING = ("mdstopo.optimizer.conic_kernels", "mdstopo.optimizer.reduced", "mdstopo.optimizer.cones")
 #: what a symbol of our own kernels begins with; symbols of functions that Numba makes differ between processes
 _OURS = "_ZN7mdstopo"
 
 
 class Unit:
-    """A function: its symbol, its intermediate code as LLVM writes it, and the units that it calls.
-
-    is_long: whether it may have machine code of its own. is_whole: whether it is Numba's, several functions with all
-    that they call.
-    """
+    """A function: its symbol, its intermediate code as LLVM writes it, and the units that it calls."""
 
     def __init__(
-        self, symbol: str, bitcode: bytes, needs: Iterable["Unit"] = (), is_long: bool = False, is_whole: bool = False
-    ) -> None:
-        self.symbol, self.bitcode, self.is_long, self.is_whole = symbol, bitcode, is_long, is_whole
+        self, symbol: str, bitcode: bytes, needs: Iterable["Unit"] = (),
+        is_long: bool = False, is_whole: bool = False, is_done: bool = False,
+    ) -> None:  # fmt: skip
+        """A unit.
+
+        symbol: what it is called by.
+        bitcode: its intermediate code.
+        needs: what it calls.
+        is_long: whether it may have machine code of its own.
+        is_whole: whether it is Numba's, several functions with all that they call.
+        is_done: whether it is long and optimised, so that no caller does it once more.
+        """
+        self.symbol, self.bitcode = symbol, bitcode
+        self.is_long, self.is_whole, self.is_done = is_long, is_whole, is_done
         self.needs = sorted({each.key: each for each in needs}.values(), key=_order)
 
     @functools.cached_property
@@ -61,7 +70,8 @@ def share(module: Any, symbol: str) -> None:
 
 
 def link(module: Any, needs: Iterable[Unit], split: bool) -> dict[str, Unit]:
-    """Link into a module all that it reaches; with `split` not what has machine code of its own, which is returned."""
+    """Link into a module all that it reaches but what is optimised already, and with `split` but what has machine code
+    of its own; both are returned, by their symbols."""
     apart: dict[str, Unit] = {}
     linked: dict[str, Unit] = {}
     waiting = sorted(needs, key=_order)
@@ -69,17 +79,29 @@ def link(module: Any, needs: Iterable[Unit], split: bool) -> dict[str, Unit]:
         unit = waiting.pop()
         if unit.symbol in linked or unit.symbol in apart:
             continue
-        if split and unit.is_long:
+        if unit.is_done or (split and unit.is_long):
             apart[unit.symbol] = unit
         else:
             linked[unit.symbol] = unit
             waiting += unit.needs
-    for unit in sorted(linked.values(), key=lambda each: (each.is_whole, *_order(each))):
+    _link(module, linked.values())
+    return dict(sorted(apart.items()))
+
+
+def complete(module: Any, needs: Iterable[Unit]) -> None:
+    """Link into a module that has been optimised what was optimised before it, with all that this reaches."""
+    reached = {unit.symbol: unit for unit in all_of(needs)}
+    _link(module, reached.values())
+
+
+def _link(module: Any, found: Iterable[Unit]) -> None:
+    """Link units into a module, without what they call."""
+    ordered = sorted(found, key=lambda each: (each.is_whole, *_order(each)))
+    for unit in ordered:
         module.link_in(unit.module, preserve=True)
-    for unit in linked.values():
+    for unit in ordered:
         if not unit.is_whole:
             module.get_function(unit.symbol).linkage = "linkonce_odr"  # gone where nobody calls it any more
-    return dict(sorted(apart.items()))
 
 
 def all_of(units: Iterable[Unit]) -> Iterator[Unit]:
@@ -112,7 +134,8 @@ def keep(unit: Unit) -> None:
     for each in all_of([unit]):
         if each.key not in known:
             known[each.key] = each
-            content = each.symbol, each.bitcode, [need.key for need in each.needs], each.is_long, each.is_whole
+            flags = each.is_long, each.is_whole, each.is_done
+            content = each.symbol, each.bitcode, [need.key for need in each.needs], *flags
             write_checked(folder / f"unit-{each.key}.kept", pickle.dumps(content))
 
 
@@ -143,6 +166,15 @@ _MADE: dict[Path, Code] = {}
 def is_long(size: int, symbol: str, inlined: bool) -> bool:
     """Whether a function of so many instructions is to have machine code of its own; inlined: its callers hold it."""
     return size >= LONG and not inlined and symbol.startswith(_OURS)
+
+
+def is_of(symbol: str, modules: Iterable[str]) -> bool:
+    """Whether a symbol is that of a function in one of the modules, or of what stands below a package (`a.b.`)."""
+    return any(symbol.startswith("_ZN" + "".join(f"{len(each)}{each}" for each in _names(name))) for name in modules)
+
+
+def _names(module: str) -> list[str]:
+    return [each for each in module.split(".") if each]
 
 
 def name_of(unit: Unit) -> str:

@@ -127,7 +127,8 @@ class GeneralDriver:
         self._message = ""
         self._allowed = MAX_STEPS
         self._make_room(method.steps, method.stages, 64)
-        self._fit()
+        if options.fits:
+            self._fit()
         #: at rest, where the case asks for it
         self.start = SettledStart(self) if case.solver.settle else None
 
@@ -525,6 +526,10 @@ class GeneralDriver:
         self.take(design)
         return self.start is None or self.start.move()
 
+    def compile_steps(self) -> None:
+        """Have the machine code on the disk that makes steps, without any steps."""
+        self.entry.simulate.compile(*self._simulate_arguments(True))
+
     def compile_responses(self) -> None:
         """Have the machine code on the disk that looks back at steps, without any steps.
 
@@ -546,6 +551,13 @@ class GeneralDriver:
             self.member_state,
         )  # fmt: skip
 
+    def _simulate_arguments(self, tangent: bool) -> tuple[Any, ...]:
+        """The arguments of the entry that makes steps."""
+        return (
+            self.ints, self.floats, self.method.tables, self._alpha, tangent, self.settings, self.limits, self.room,
+            self.room_ints, self.member_state, self.work, self.where,
+        )  # fmt: skip
+
     def run(
         self, alpha: FloatArray, tangent: bool, quadrature_breakpoints: Sequence[float] = ()
     ) -> tuple[int, int, float]:
@@ -561,10 +573,8 @@ class GeneralDriver:
         )
         while True:
             self.work[:] = 0
-            code, count, self.events, time = self.ready(
-                "simulate", self.entry.simulate, self.ints, self.floats, self.method.tables, self._alpha, tangent,
-                self.settings, self.limits, self.room, self.room_ints, self.member_state, self.work, self.where,
-            )  # fmt: skip
+            arguments = self._simulate_arguments(tangent)
+            code, count, self.events, time = self.ready("simulate", self.entry.simulate, *arguments)
             if code != NEEDS_ROOM:
                 code, count, time = self._up_to_half_a_turn(code, count, time)
                 self.count = count

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import member_kernel, vector_entry
 from mdstopo.optimizer import cones
-from mdstopo.optimizer.kernels import add, dot
+from mdstopo.optimizer.kernels import add, dot, put
 from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.optimizer.reduced import Curved, Factored, Rows, factor, solve, times
 
@@ -90,7 +90,8 @@ def interior(
         np.empty(len(at)), np.empty(len(penalty) + 1), np.empty(len(group) - len(excess)), np.empty((len(excess), 3)),
         np.empty(len(b)),
     )  # fmt: skip
-    here, here_cone, here_free = pair.copy(), cone.copy(), free.copy()
+    here, here_cone, here_free = np.empty(pair.shape), np.empty(cone.shape), np.empty(len(free))
+    _put_point(here, here_cone, here_free, pair, cone, free)
     best, best_gap, best_worst, good = np.inf, np.inf, np.inf, False
     step, lately = 0, 0
     while True:
@@ -104,15 +105,29 @@ def interior(
         enough = gap <= ENOUGH_GAP and worst <= ENOUGH_RESIDUAL
         if score < best and (enough or not good):  # rounding may undo what was solved
             best, best_gap, best_worst, good = score, gap, worst, enough
-            pair[:] = here
-            cone[:] = here_cone
-            free[:] = here_free
+            _put_point(pair, cone, free, here, here_cone, here_free)
         if score <= 1.0 or step == MAX_STEPS or step - lately >= (PATIENCE if good else MORE * PATIENCE):
             break
         step += 1
         if not _advance(p, parts, here, here_cone, here_free, missing, gap, count):
             break
     return step, good, best_gap, best_worst
+
+
+@member_kernel
+def _put_point(pair: Floats, cone: Floats, free: Floats, of_pair: Floats, of_cone: Floats, of_free: Floats) -> None:
+    """A point put in the place of another.
+
+    Out:
+      pair, cone, free: the place.
+    In:
+      of_pair, of_cone, of_free: the point.
+    """
+    for side in range(2):
+        put(pair[side], of_pair[side])
+        for k in range(cone.shape[1]):
+            put(cone[side, k], of_cone[side, k])
+    put(free, of_free)
 
 
 @member_kernel
@@ -221,7 +236,7 @@ def _advance(
     system, solvable = factor(p.curved, D, rows, p.A, L, E)
     if not solvable:
         return False
-    step, step_cone, step_free = np.zeros_like(pair), np.zeros_like(cone), np.zeros_like(free)
+    step, step_cone, step_free = np.zeros(pair.shape), np.zeros(cone.shape), np.zeros(len(free))
     target, a = 0.0, 0.0
     for corrector in range(2):
         aim, aim_cone = np.empty(parts.total), np.empty((len(p.excess), 3))
@@ -259,7 +274,7 @@ def _rows(p: Scaled, parts: Parts, pair: Floats, scaling: cones.Scaling) -> Rows
     many = lines + 3 * norms
     rows = Rows(np.empty((many, n)), np.empty(many, dtype=np.int64), np.empty(many), np.empty(many))
     for r in range(lines):
-        rows.G[r] = p.slopes[r]
+        put(rows.G[r], p.slopes[r])
         rows.level[r] = p.group[r]
         rows.C[r] = -1.0
         rows.S[r] = pair[0, parts.line + r] / pair[1, parts.line + r]

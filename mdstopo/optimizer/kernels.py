@@ -109,6 +109,13 @@ def add(total: Floats, weight: float, row: Floats) -> None:
 
 
 @member_kernel
+def put(out: Floats, row: Floats) -> None:
+    """out = row, of the first one's length. (`out[:] = row` compiles for ten times as long.)"""
+    for i in range(len(out)):
+        out[i] = row[i]
+
+
+@member_kernel
 def dot(a: Floats, b: Floats) -> float:
     """The inner product of two vectors, of the first one's length."""
     total = 0.0

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.compiler.jit import member_kernel
-from mdstopo.optimizer.kernels import add, dot
+from mdstopo.optimizer.kernels import add, dot, put
 from mdstopo.optimizer.problem import Floats, Ints
 
 #: slack over multiplier, in the scaled problem, below which a row is all but active
@@ -131,13 +131,13 @@ def solve(
             add(dv, -x[a], found.Q[a])
         for i in range(n):
             dv[i] *= found.inverse[i]
-        dy[:] = x[first : first + R]
-        da[:] = x[first + R : count]
-        de[:] = x[count:]
+        put(dy, x[first:])
+        put(da, x[first + R :])
+        put(de, x[count:])
         return
-    right[:n] = r_v
-    right[n : n + g] = r_e
-    right[n + g : n + g + m] = r_a
+    put(right[:n], r_v)
+    put(right[n : n + g], r_e)
+    put(right[n + g : n + g + m], r_a)
     for r in range(R):
         if found.place[r] >= 0:
             right[found.place[r]] = r_y[r]
@@ -146,9 +146,9 @@ def solve(
             add(right[:n], weight, rows.G[r])
             right[n + rows.level[r]] += weight * rows.C[r]
     _refined(found, right, x)
-    dv[:] = x[:n]
-    de[:] = x[n : n + g]
-    da[:] = x[n + g : n + g + m]
+    put(dv, x)
+    put(de, x[n:])
+    put(da, x[n + g :])
     for r in range(R):
         if found.place[r] >= 0:
             dy[r] = x[found.place[r]]
@@ -179,7 +179,7 @@ def _of_variables(P: Curved, D: Floats, rows: Rows, A: Floats, L: Floats, E: Flo
     M = np.zeros((size, size))
     for i in range(n):  # the lower triangle
         if len(P.matrix):
-            M[i, : i + 1] = P.matrix[i, : i + 1]
+            put(M[i, : i + 1], P.matrix[i])
         else:
             for k in range(len(P.weight)):
                 add(M[i, : i + 1], P.weight[k] * P.factor[k, i], P.factor[k])
@@ -189,11 +189,11 @@ def _of_variables(P: Curved, D: Floats, rows: Rows, A: Floats, L: Floats, E: Flo
         M[n + j, n + j] = E[j - 1]
     _add_products(M, rows, gone[:many], n)
     for a in range(m):
-        M[n + g + a, :n] = A[a]
+        put(M[n + g + a, :n], A[a])
         M[n + g + a, n + g + a] = -L[a]
     for r in range(R):
         if place[r] >= 0:
-            M[place[r], :n] = rows.G[r]
+            put(M[place[r], :n], rows.G[r])
             M[place[r], n + rows.level[r]] = rows.C[r]
             M[place[r], place[r]] = -rows.S[r]
     swap = np.empty(size, dtype=np.int64)
@@ -236,9 +236,12 @@ def _of_rows(P: Curved, D: Floats, rows: Rows, A: Floats, L: Floats, E: Floats) 
     count = rank + R + m
     size = count + g
     Q = np.empty((count, n))
-    Q[:rank] = P.factor
-    Q[rank : rank + R] = rows.G
-    Q[rank + R :] = A
+    for k in range(rank):
+        put(Q[k], P.factor[k])
+    for r in range(R):
+        put(Q[rank + r], rows.G[r])
+    for a in range(m):
+        put(Q[rank + R + a], A[a])
     inverse = np.empty(n)
     for i in range(n):
         inverse[i] = 1.0 / (P.diagonal[i] + D[i])

@@ -2,8 +2,9 @@
 
 Why it is not this one, `starts.getting_ready` tells. Another process is this module run as a program: alone it compiles
 all that the case needs; with the word `back` what the optimiser needs and what looks back at steps that were made. For
-scenes with joints and other laws both run side by side, and what the one has compiled the other finds on the disk.
-Where nothing is optimised, one process beside this one has the word `responses`: `responses_apart`.
+scenes with joints and other laws both run side by side, the longest entries first, and what the one has compiled the
+other finds on the disk. Where nothing is optimised, one process beside this one has a share of its own, `responses` or
+`steps`: `compiled_beside`.
 """
 
 import contextlib
@@ -26,11 +27,11 @@ from mdstopo.plan.pricing import price
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.starts.evaluator_interface import even, problem_of
-from mdstopo.starts.getting_ready import FEW, get_ready, meet
+from mdstopo.starts.getting_ready import FEW, get_ready, meet, motions
 from mdstopo.warm import compilation_due, compiling, tiny
 
-#: the words that have a process compile what looks back, with the optimiser and without it
-BACK, RESPONSES = "back", "responses"
+#: the words that have a process compile what looks back, with the optimiser and without it, and what makes steps
+BACK, RESPONSES, STEPS = "back", "responses", "steps"
 #: candidates that are priced to have the kernels compiled
 FEW_CANDIDATES = 1000
 
@@ -70,15 +71,16 @@ def _compile_in_children(message: bytes, each: list[list[str]]) -> None:
 
 
 @contextlib.contextmanager
-def responses_apart(case: Case) -> Iterator[None]:
-    """Meanwhile another process compiles what looks back at steps, where that is not there and as much as the steps.
+def compiled_beside(case: Case, share: str) -> Iterator[None]:
+    """Meanwhile another process compiles a share of what a scene with joints or other laws needs, where nothing of it
+    is there yet: with RESPONSES what looks back at steps, with STEPS what makes steps, where `auto` has to.
 
-    It is for commands that evaluate: what they do meanwhile finds on the disk what the other process has compiled.
+    What this process does meanwhile finds on the disk what the other one has compiled.
     """
     child = None
     with contextlib.suppress(OSError):  # no process can be started, or it has ended
         if beyond_springs(case) and compilation_due(case):
-            child = _begin([RESPONSES])
+            child = _begin([share])
             _tell(child, pickle.dumps(case))
     try:
         yield
@@ -134,6 +136,10 @@ def _main() -> None:
     end_with_parent(sys.stdin.buffer)
     if RESPONSES in sys.argv[1:]:
         evaluator_of(case, beside=False).compile_responses()
+    elif STEPS in sys.argv[1:]:
+        engine = evaluator_of(case, beside=False)
+        if engine.may_simulate_to_choose:
+            engine.compile_steps()
     elif BACK in sys.argv[1:]:
         _compile_back(case)
     else:
@@ -156,6 +162,9 @@ def _compile_all(case: Case) -> None:
     engine = evaluator_of(case, share=["mdstopo.session.compiling_apart"] if many else [])
     if many:
         meet(case, MANY)
+    if beyond_springs(case):
+        engine.compile_steps()
+        motions(case, engine, case.start)  # what the other process compiles last comes last here
     problem = problem_of(engine, even(case))
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(case.space.expand(begin), gradient=True)

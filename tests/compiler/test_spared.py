@@ -4,9 +4,10 @@ import gc
 
 import numpy as np
 import pytest
+from llvmlite import binding as llvm
 
 from mdstopo.compiler import tried
-from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.jit import entry, kernel, member_kernel, vector_entry
 
 pytestmark = pytest.mark.skipif(not tried.has_own_passes(), reason="Numba compiles with its own passes")
 
@@ -102,3 +103,73 @@ def test_no_type_of_numba_s_stands_for_others() -> None:
     assert isinstance(types.Array(types.float64, 2, "C"), types.Buffer)
     with pytest.raises(TypeError):
         isinstance(types.int64, "types.Integer")
+
+
+@entry
+def put(out, row):
+    out[1:] = row
+
+
+def test_numbers_of_another_size_are_refused() -> None:
+    out = np.zeros(4)
+    put(out, np.arange(1.0, 4.0))
+    assert out.tolist() == [0.0, 1.0, 2.0, 3.0]
+    with pytest.raises(ValueError, match="cannot assign slice from input of different size"):
+        put(out, np.zeros(2))
+
+
+@member_kernel
+def _inner(x):
+    total = 0.0
+    for i in range(x.shape[0]):
+        total += x[i] * x[i]
+    return total
+
+
+@member_kernel
+def _outer(x, y):
+    return _inner(x) + 2.0 * _inner(y)
+
+
+@vector_entry
+def in_one(x, y):
+    return _outer(x, y) - _inner(y)
+
+
+@entry
+def in_strict(x, y):
+    return _outer(x, y) + _inner(y)
+
+
+@pytest.mark.parametrize("split", ["", __name__], ids=["in one piece", "apart"])
+def test_long_loops_are_optimised_once(split: str, monkeypatch) -> None:
+    from mdstopo.compiler import units
+    from mdstopo.compiler.call import Native
+    from mdstopo.compiler.kernel import compile_anew, way
+
+    way()
+    compiles = tried.private()
+    assert compiles is not None
+    monkeypatch.setattr(units, "LONG", 1)
+    monkeypatch.setattr(units, "_OURS", "_ZN")
+    monkeypatch.setattr(units, "SPLIT", split or units.SPLIT)
+    monkeypatch.setattr(units, "STAYING", (__name__,))
+    optimised = []
+    run = llvm.ModulePassManager.run
+
+    def noted(self, module, builder):
+        optimised.append([each.name for each in module.functions if not each.is_declaration])
+        return run(self, module, builder)
+
+    monkeypatch.setattr(llvm.ModulePassManager, "run", noted)
+    x, y = np.arange(5.0), np.arange(3.0)
+    monkeypatch.setattr(compiles.Cache, "load_overload", lambda *_: None)
+    compile_anew()
+    for program, expected in ((in_one, 35.0), (in_strict, 45.0)):
+        code = compiles.build(program.dispatcher, "d1 d1")
+        assert len(code.needs) == (2 if split and program is in_strict else 0)
+        if not code.needs:
+            assert Native("program", code, "d1 d1")(x, y) == expected
+    passes = [sum(any("_inner" in name for name in names) for names in optimised)]
+    passes += [sum(any("_outer" in name for name in names) for names in optimised)]
+    assert passes == [2, 2]  # Numba makes two passes over a module

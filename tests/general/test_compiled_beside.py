@@ -31,7 +31,6 @@ TOGETHER = "combine: {method: weighted_sum, weights: {tip: 1, turn: 1}}\n"
 @pytest.mark.parametrize(("more", "names"), [("", {"peaks_vjp"}), (SECOND + TOGETHER, {"rows_vjp", "peaks_of_steps"})])
 def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch, more: str, names: set[str]) -> None:
     engine = Evaluator(read_case(CASE + more))
-    driver = engine.driver("default")
     looked_for = Entry._for
     asked: list[tuple[str, str | None]] = []
 
@@ -41,9 +40,40 @@ def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch, more: s
 
     monkeypatch.setattr(Entry, "_for", noted)
     evaluating = False
-    driver.compile_responses()
+    engine.compile_responses()
+    engine.compile_steps()
     compiled, asked[:] = set(asked), []
-    assert {name for name, _ in compiled} == names
+    assert {name for name, _ in compiled} == {"simulate", *names}
     evaluating = True
     assert np.all(np.isfinite(engine.evaluate(engine.case.start, gradient=True).gradients["tip"]))
     assert compiled <= set(asked)
+
+
+DAMPED = CASE.replace("stiffness: 50}", "stiffness: 50, damping: 2}")
+
+
+@pytest.mark.parametrize(
+    ("text", "simulates"),
+    [
+        (DAMPED, True),
+        (CASE, False),
+        (DAMPED + "solver: {integrator: runge_kutta}\n", False),
+        (DAMPED + "solver: {integrator: generalized_alpha, step: 1e-3}\n", False),
+    ],
+    ids=["damped", "undamped", "stated", "fixed steps"],
+)
+def test_steps_are_compiled_for_a_choice_only_where_auto_simulates(
+    text: str, simulates: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine = Evaluator(read_case(text))
+    assert engine.may_simulate_to_choose == simulates
+    asked = []
+
+    def held_short(*_arguments: Any) -> str:
+        asked.append(True)
+        return ""
+
+    monkeypatch.setattr("mdstopo.general.stiffness.held_short", held_short)
+    monkeypatch.setattr(Evaluator, "_made", lambda *_: None)
+    assert engine.integrator
+    assert bool(asked) == simulates
