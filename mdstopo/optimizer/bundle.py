@@ -20,6 +20,8 @@ from mdstopo.optimizer.wide_numbers import WIDE
 ROOM, LEAST, MOST = 2e7, 8, 160
 #: a row within this of another of its group, in slope and in value relative to the steepest, is the same
 SAME = 1e-9
+#: share of a row's slope by which a row from elsewhere may differ from it and still be the same peak, seen earlier
+SEEN_AGAIN = 0.1
 
 
 @dataclass(slots=True)
@@ -161,6 +163,21 @@ class Bundle:
             if kept[i] and alike(self.slope, k, i, SAME * steepest[i]):
                 kept[i] = False
         return self if kept.all() else self.subset(kept)
+
+    def without_peaks_of(self, new: "Bundle") -> "Bundle":
+        """Those of these rows that are no peak of `new`, seen before: the group is the same, the slope nearly.
+
+        Beside the curvature that a subproblem has, such a row would count the curvature of its peak once more, and
+        steps would become ever shorter. Of very many variables all rows stay: they are few.
+        """
+        if isinstance(self.slope, Stack) or not len(self):
+            return self
+        nowhere = np.zeros(self.slope.shape[1])
+        old, fresh = self.slopes_at(nowhere), new.slopes_at(nowhere)
+        size = np.einsum("rn,rn->r", fresh, fresh)
+        apart = np.einsum("kn,kn->k", old, old)[:, None] + size - 2.0 * (old @ fresh.T)
+        seen = (apart <= SEEN_AGAIN**2 * size) & (self.group[:, None] == new.group)
+        return self.subset(~seen.any(axis=1))
 
     def thinned(self) -> "Bundle":
         """At most as many rows as there is room for: the iterate's own, those that were used last, the newest."""

@@ -36,8 +36,8 @@ ROUNDING = 1e-8
 LEAST_PENALTY, PENALTY_FALL = 1e-2, 0.5
 #: what is left of the concavity from trial to trial
 CONCAVITY_FALL = 0.9
-#: iterates whose violation has not fallen to this share of what it was, after which limits are restored first; and the
-#: factor on penalties when that is done
+#: iterates whose violation has not fallen to this share of what it was, and of which their rows do not promise it
+#: either, after which limits are restored first; and the factor on penalties when that is done
 STAGNANT, VIOLATION_FALL, RESTORED_PENALTY = 6, 0.8, 10.0
 #: the least box, in ranges, in which the objective is returned to once limits are restored; and the least one in which
 #: rows are dropped, in shares of the widest
@@ -162,8 +162,9 @@ class BundleMethod:
         state.small = state.small + 1 if small else 0
         accepted = ratio >= settings.number("accept_ratio")
         if accepted:
-            self._count_stagnation(state, there)
-            state.bundle = moved.joined(new)
+            promised = moved.subset(state.bundle.own).levels(groups)
+            self._count_stagnation(state, *(float(levels[1:].max(initial=0.0)) for levels in (here, promised, there)))
+            state.bundle = moved.without_peaks_of(new).joined(new)
             state.kkt = float("nan")
             state.trust = self._trust_after_step(state.trust, size, ratio)
             if not small:
@@ -269,14 +270,16 @@ class BundleMethod:
         )
         return trial
 
-    def _count_stagnation(self, state: GsaoState, there: Floats) -> None:
-        """Count iterates whose largest violation is not much below that of the one that the count began with."""
-        violation = float(there[1:].max(initial=0.0))
-        if violation <= self.settings.tolerance:
-            state.stagnation, state.violation_mark = 0, float("inf")
-        elif violation < VIOLATION_FALL * state.violation_mark:
-            state.stagnation, state.violation_mark = 0, violation
-        else:
+    def _count_stagnation(self, state: GsaoState, before: float, promised: float, violation: float) -> None:
+        """Count iterates whose largest violation is not much below that of the one that the count began with.
+
+        before, promised, violation: the largest one at the last iterate, at this one by the rows of the last one, and
+        at this one. Where the rows promised a fall, the violation is what they leave out: it goes as steps get shorter.
+        """
+        if violation <= self.settings.tolerance or violation < VIOLATION_FALL * state.violation_mark:
+            state.stagnation = 0
+            state.violation_mark = violation if violation > self.settings.tolerance else float("inf")
+        elif promised >= VIOLATION_FALL * before:
             state.stagnation += 1
 
     def _learn_concavity(self, state: GsaoState, seen: Bundle, here: Floats, moved: Bundle, there: Floats) -> None:

@@ -2,7 +2,9 @@
 
 What rows that are lines or norms leave out of the Lagrangian's curvature is learnt from its gradients: BFGS, damped as
 by M. J. D. Powell (1978), of all steps where the variables are few, else of the last ones in compact form (R. H. Byrd,
-J. Nocedal and R. B. Schnabel, 1994).
+J. Nocedal and R. B. Schnabel, 1994). Of few variables B is scaled down before an update where it is far too large along
+the step (S. S. Oren and D. G. Luenberger, 1974): BFGS alone learns of one direction a step that it is as flat. To scale
+at every step would delay the convergence of smooth functions (J. Nocedal and Y. Yuan, 1993).
 """
 
 from dataclasses import dataclass, replace
@@ -15,6 +17,8 @@ from mdstopo.optimizer.problem import Bools, Floats
 FEW, PAIRS = 250, 12
 #: the least y's over s'B s, before y is damped
 DAMPING = 0.2
+#: the share of B's curvature along a step below which B is scaled down, by this factor
+FAR_TOO_LARGE = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +78,8 @@ def learnt(steps: Floats, changes: Floats, floor: float) -> Curvature:
         sBs = float(s @ Bs)
         if not sBs > 0.0:
             continue
+        if 0.0 < float(s @ y) < FAR_TOO_LARGE * sBs:
+            B, Bs, sBs = FAR_TOO_LARGE * B, FAR_TOO_LARGE * Bs, FAR_TOO_LARGE * sBs
         damped = _damped(s, y, Bs, sBs)
         B = B - np.outer(Bs, Bs) / sBs + np.outer(damped, damped) / float(s @ damped)
     return Curvature(np.zeros(n), np.zeros((n, 0)), np.zeros(0), 0.5 * (B + B.T))

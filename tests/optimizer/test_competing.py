@@ -157,6 +157,32 @@ def test_a_row_from_elsewhere_says_no_more_of_the_iterate_than_its_own_rows():
     assert rows.values() == pytest.approx([3.0, 1.0])
 
 
+def test_a_peak_that_is_seen_again_takes_the_place_of_what_was_seen_before():
+    """Earlier rows go where one of the same group has nearly the same slope, whatever the order; others stay."""
+    slopes = np.array([[1.0, 0.0], [1.0, 0.05], [0.0, 1.0], [2.0, 0.0]])
+    earlier = Bundle.of(Sample(4.0, np.array([4.0, 3.0, 2.0, 1.0]), slopes), np.arange(4)).moved(np.zeros(2), 1.0)
+    now = Bundle.of(Sample(5.0, np.array([5.0]), np.array([[1.0, 0.0]])), np.array([0]))
+    assert earlier.without_peaks_of(now).values().tolist() == [2.0, 1.0]
+    now.group[:] = 1
+    assert len(earlier.without_peaks_of(now)) == 4
+    assert len(Bundle.empty(2).without_peaks_of(now)) == 0
+
+
+def test_a_violation_that_steps_along_a_limit_leave_is_not_restored_first():
+    """Through a narrow tube along a sine: every step leaves it a little, and goes on."""
+
+    def limits(x):
+        off, slope = x[1] - np.sin(8.0 * x[0]), np.array([-8.0 * np.cos(8.0 * x[0]), 1.0])
+        return np.array([off, -off]) - 1e-3, np.stack([slope, -slope])
+
+    problem = Toy(lambda x: (np.array([-x[0]]), np.array([[-1.0, 0.0]])), [0.0, 0.0], -2.0, 2.0, constraints=limits)
+    problem.competes = True
+    state = ended(problem, tolerance=1e-9)
+    assert state.status is RunStatus.CONVERGED
+    assert state.best_alpha[0] == pytest.approx(2.0)
+    assert len(problem.evaluated) <= 80
+
+
 def test_of_too_many_rows_those_go_that_have_not_been_used(monkeypatch):
     monkeypatch.setattr("mdstopo.optimizer.bundle.ROOM", 8e4)
     n = 10**4

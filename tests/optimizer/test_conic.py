@@ -198,6 +198,17 @@ def test_curvature_is_learnt_from_steps(n):
     assert np.linalg.eigvalsh(B.dense()).min() > 0.0
 
 
+def test_a_steep_last_step_makes_directions_that_nothing_is_known_of_no_steeper_than_others():
+    """Four flat directions are known, then a steep one, a sixth is not: it is not taken for a steep one."""
+    scale = np.array([1.0, 1.0, 1.0, 1.0, 1000.0])
+    steps = np.eye(6)[:5]
+    B = learnt(steps, steps * np.append(scale, 1.0), 1e-3).dense()
+    assert B[4, 4] == pytest.approx(1000.0)
+    assert np.diag(B)[:4].max() <= 1.0 + 1e-9
+    assert np.diag(B)[:4].min() >= 0.2
+    assert B[5, 5] <= 5.0
+
+
 @pytest.mark.parametrize("n", [4, 300])
 def test_curvature_stays_positive_where_the_function_bends_down(n):
     rng = np.random.default_rng(3)
