@@ -24,7 +24,7 @@ from mdstopo.mechanics.laws.sums import upper_triangle
 
 
 @kernel
-def _seen(ax, ay, room, j):
+def seen_in_row(ax, ay, room, j):
     """r, L^2 and 1/L of the members of row j."""
     rx = ax + room[j, 0]
     ry = ay + room[j, 1]
@@ -73,7 +73,7 @@ def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room
     sum_t = zero()
     energy = zero()
     ax, ay = turned_columns(qx, qy, first, r[2], r[3])
-    seen = _seen(ax, ay, room, np.int64(0))
+    seen = seen_in_row(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
         bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
         moved = moved_columns(qx, qy, i, r) if close else nothing_moved
@@ -81,13 +81,13 @@ def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room
         own_y = zero()
         at = i
         for j in range(1, room.shape[0]):
-            following = _seen(ax, ay, room, j)
+            following = seen_in_row(ax, ay, room, j)
             w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
             own_x += w * seen[0]
             own_y += w * seen[1]
             at += width
             seen = following
-        following = _seen(bx, by, room, np.int64(0))
+        following = seen_in_row(bx, by, room, np.int64(0))
         w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
         own_x += w * seen[0]
         own_y += w * seen[1]
@@ -242,18 +242,18 @@ def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, ro
     sums = no_columns(nothing)
     energy = nothing
     ax, ay = turned_columns(qx, qy, first, r[2], r[3])
-    seen = _seen(ax, ay, room, np.int64(0))
+    seen = seen_in_row(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
         bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
         moved = moved_columns(qx, qy, i, r) if close else nothing_moved
         own = no_members(nothing)
         at = i
         for j in range(1, room.shape[0]):
-            following = _seen(ax, ay, room, j)
+            following = seen_in_row(ax, ay, room, j)
             own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
             at += width
             seen = following
-        following = _seen(bx, by, room, np.int64(0))
+        following = seen_in_row(bx, by, room, np.int64(0))
         own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
         seen = following
         sums = add_column(sums, ax, ay, own)
