@@ -120,3 +120,21 @@ def test_a_spring_of_a_grid_without_length_has_no_force() -> None:
     without[3] += stored
     assert np.isfinite(found).all()
     same(found, without, 1e-14)
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("length", LENGTHS)
+def test_the_derivative_of_many_poses_is_the_sum_of_theirs(length: int) -> None:
+    (model, _), p, count = grid(length), law("elastic"), ROWS * length
+    rel, u = np.zeros((4, 2, POSE)), np.random.default_rng(3).normal(size=(4, 2, 3))
+    for s in range(4):
+        rel[s, 0] = pose(0.2 * (s + 1))
+    found, expected = np.zeros((2, WIDTH))
+    KERNELS.spring_designs(model, p, START, count, length, rel, u, 0, found)
+    for s in range(4):
+        for i in range(START, START + count):
+            _, x, work = KERNELS.member_work(model, i, rel[s, 0], u[s, 0])
+            expected[i] += p[0] * x * work
+    same(found, expected, 1e-13)
+    assert not found[:START].any()
+    assert not found[START + count :].any()

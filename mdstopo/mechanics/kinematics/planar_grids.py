@@ -13,16 +13,18 @@ the relative pose.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.vector import lanes, load, total, unmarked, where_larger, zero
+from mdstopo.compiler.vector import lanes, load, store, total, unmarked, where_larger, zero
 from mdstopo.mechanics.grids import PLACES
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.mechanics.laws.spring_grid import (
     add_column,
     add_member,
     force_and_tangent,
+    moved_at,
     moved_columns,
     no_columns,
     no_members,
+    seen_at,
     seen_in_row,
     turned_columns,
 )
@@ -50,7 +52,7 @@ def grid_sums(member, width, scale, start, count, length, p, rel, pair, poses, c
       sums (poses or more, n_pair, SUMS): Q, and on demand E, E_xi and K, added to.
     """
     rows = count // length
-    tall = rows if count <= PLACES else min(rows, ROWS)
+    tall = _tall(rows, count)
     wide = min(length, PLACES // tall // lanes() * lanes())
     room = np.empty((tall, 4))
     for row in range(0, rows, tall):
@@ -62,6 +64,12 @@ def grid_sums(member, width, scale, start, count, length, p, rel, pair, poses, c
                     member, width, scale, start + row * length, first, last, length, p, rel[j, pair], counted, tangent,
                     own, sums[j, pair],
                 )  # fmt: skip
+
+
+@part
+def _tall(rows, count):
+    """Rows of a tile of a grid with so many rows and members."""
+    return rows if count <= PLACES else min(rows, ROWS)
 
 
 @part
@@ -157,3 +165,83 @@ def _stretch(moved, seen, free, excess):
     x = r2 * y - free
     off = 0.5 * y * (x * (r2 * y + free) - ((excess - squared) + (twice_x * rx + twice_y * ry)))
     return x - where_larger(r2 - squared, 0.0, off)
+
+
+@kernel
+def grid_designs(member, width, start, count, length, k, rel, u, pair, out):
+    """Add sum_j f (b . u_j) over S poses of each spring, without damping and preload, at alpha^mu = 1.
+
+    In:
+      member, width, start, count, length: as above.
+      k: stiffness (N/m).
+      rel (S, n_pair, POSE): relative poses.
+      u (S, n_pair, 3): virtual changes of these.
+      pair: number of the pair.
+    Out:
+      out (M or more,): added to.
+    """
+    rows = count // length
+    tall = _tall(rows, count)
+    room = np.empty((tall, rel.shape[0], 4))
+    turned = np.empty((rel.shape[0], 5, lanes()))
+    for row in range(0, rows, tall):
+        own = room[: min(tall, rows - row)]
+        at = start + row * length
+        _begin_designs(member, width, at, length, rel, u, pair, own)
+        for begin in range(0, length, lanes()):
+            _design_columns(member, width, at, begin, length, k, rel, pair, own, turned, out)
+
+
+@part
+def _begin_designs(member, width, at, length, rel, u, pair, room):
+    """Find e of rows, and u + e x u_theta, by which u changes r of all their members (m).
+
+    member, width, length, rel, u, pair: as of `grid_designs`. at: the first member of the first row.
+    room (rows, S, 4): out.
+    """
+    for j in range(room.shape[0]):
+        for m in range(room.shape[1]):
+            ex = rel[m, pair, 0] - member[PX * width + at + j * length]
+            ey = rel[m, pair, 1] - member[PY * width + at + j * length]
+            room[j, m, 0] = ex
+            room[j, m, 1] = ey
+            room[j, m, 2] = u[m, pair, 0] + ey * u[m, pair, 2]
+            room[j, m, 3] = u[m, pair, 1] - ex * u[m, pair, 2]
+
+
+@part
+def _design_columns(member, width, start, begin, length, k, rel, pair, room, turned, out):
+    """`grid_designs` of a vector of columns of a tile.
+
+    In:
+      member, width, length, k, rel, pair: as of `grid_designs`.
+      start: the first member of the tile's first row. begin: the first column.
+      room (rows, S, 4): of `_begin_designs`.
+    Out:
+      out (M or more,): added to.
+      turned (S, 5, lanes): scratch: a, 2 x and x^2 of the columns at the poses (`spring_grid.moved_columns`).
+    """
+    i = min(begin, length - lanes())
+    done = (1 << (begin - i)) - 1
+    qx = member[QX * width + start : QX * width + start + length]
+    qy = member[QY * width + start : QY * width + start + length]
+    for m in range(turned.shape[0]):
+        r = rel[m, pair]
+        ax, ay = turned_columns(qx, qy, i, r[2], r[3])
+        twice_x, twice_y, squared = moved_columns(qx, qy, i, r)
+        store(turned[m, 0], 0, ax)
+        store(turned[m, 1], 0, ay)
+        store(turned[m, 2], 0, twice_x)
+        store(turned[m, 3], 0, twice_y)
+        store(turned[m, 4], 0, squared)
+    at = start + i
+    for j in range(room.shape[0]):
+        free = load(member, L0 * width + at)
+        excess = load(member, EXCESS * width + at)
+        work = zero()
+        for m in range(turned.shape[0]):
+            seen = seen_at(turned, room, j, m)
+            stretch = _stretch(moved_at(turned, m), seen, free, excess)
+            work = work + stretch * seen[3] * (seen[0] * room[j, m, 2] + seen[1] * room[j, m, 3])
+        store(out, at, load(out, at) + k * unmarked(work, done))
+        at += length

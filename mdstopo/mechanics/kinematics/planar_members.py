@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import inline, kernel, part
 from mdstopo.compiler.padding import whole_vectors
-from mdstopo.mechanics.kinematics.planar_grids import grid_sums
+from mdstopo.mechanics.kinematics.planar_grids import grid_designs, grid_sums
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
 from mdstopo.mechanics.laws.alike import (
     alike_damping,
@@ -273,7 +273,10 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     """`member_designs` of springs at many poses; see `kinematics_interface.spring_designs`."""
     width = model.member.shape[1]
     rows = model.member.reshape(model.member.size)
-    elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
+    if row > 0:
+        grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, out)
+    else:
+        elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
 
 
 @part

@@ -284,7 +284,7 @@ def _add(own, energy, seen, moved, k, l0, excess, at, close):
 
 
 @kernel
-def _seen_at(turned, room, j, m):
+def seen_at(turned, room, j, m):
     """r, L^2 and 1/L of the members of row j at pose m."""
     rx = load(turned[m, 0], 0) + room[j, m, 0]
     ry = load(turned[m, 1], 0) + room[j, m, 1]
@@ -293,7 +293,7 @@ def _seen_at(turned, room, j, m):
 
 
 @kernel
-def _moved_at(turned, m):
+def moved_at(turned, m):
     """What `moved_columns` gave at pose m."""
     return load(turned[m, 2], 0), load(turned[m, 3], 0), load(turned[m, 4], 0)
 
@@ -358,20 +358,20 @@ def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, 
                 store(turned[m, 3], 0, twice_y)
                 store(turned[m, 4], 0, u2)
         at = i
-        seen = _seen_at(turned, room, np.int64(0), np.int64(0))
+        seen = seen_at(turned, room, np.int64(0), np.int64(0))
         for j in range(rows):
             free = load(l0, at)
             work = zero()
             for m in range(1, many):
-                following = _seen_at(turned, room, j, m)
-                work += _work(seen, _moved_at(turned, m - 1), room[j, m - 1], free, excess, at, close[m - 1])
+                following = seen_at(turned, room, j, m)
+                work += _work(seen, moved_at(turned, m - 1), room[j, m - 1], free, excess, at, close[m - 1])
                 seen = following
             if many > 0:
-                following = _seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
-                work += _work(seen, _moved_at(turned, many - 1), room[j, many - 1], free, excess, at, close[many - 1])
+                following = seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
+                work += _work(seen, moved_at(turned, many - 1), room[j, many - 1], free, excess, at, close[many - 1])
                 seen = following
             for m in range(many, poses):
-                stretch = _stretch(_seen_at(turned, room, j, m), _moved_at(turned, m), free, excess, at, close[m])
+                stretch = _stretch(seen_at(turned, room, j, m), moved_at(turned, m), free, excess, at, close[m])
                 work += 0.5 * weight[m - many] * stretch * stretch
             store(out, at, load(out, at) + load(k, at) * work)
             at += width
