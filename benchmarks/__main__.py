@@ -30,6 +30,7 @@ SECTIONS = {
     "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
     "fit": "fits of synthetic measurements: how often intervals hold the truth; work beside differences",
     "formulas": "laws by formula beside the built-in laws: values, gradients, time",
+    "chains": "springs between free bodies by their own kernels and by those of general scenes",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
     "optimum": "does the optimiser find the optimum, is its last word true; beside other optimisers",
     "peers": "the paper's scene and others beside other programs, which the extra peers installs",
@@ -57,7 +58,7 @@ PEERS_IN_SPACE = ("peers_space", "ring_space", "forward_space")
 CAMPAIGNS = ("damage", "hunt", "hunt_space")
 
 #: sections that take an hour, or measure nothing, are run where they are named
-NAMED = (*PEERS, *PEERS_IN_SPACE, *CAMPAIGNS, "optimum", "parts", "golden", "lifts", "priced", "catalogue")
+NAMED = (*PEERS, *PEERS_IN_SPACE, *CAMPAIGNS, "optimum", "parts", "golden", "lifts", "priced", "catalogue", "chains")
 
 #: the page that holds the tables of each section which `--readme` writes
 PAGES = {
@@ -78,6 +79,7 @@ TOLD = {
     "catalogue": "docs/catalogue.md",
     "priced": "docs/theory/pricing.md",
     "securing": "docs/applications/cargo.md",
+    "chains": "docs/architecture.md",
 }
 
 

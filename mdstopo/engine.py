@@ -4,7 +4,7 @@
 evaluate these, differentiate. Each load case is one scene; objectives of one load case share its simulation.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from time import perf_counter
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, STIFF
+from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, SMOOTH, STIFF
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
 from mdstopo.case.sensitivities import SENSITIVITIES, chosen
 from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
@@ -386,22 +386,33 @@ class Evaluator:
 
     @cached_property
     def _choice(self) -> tuple[str, str]:
-        """The integrator, and why; where `auto` would take explicit steps, their motions from the case's start tell."""
+        """The integrator, and why; where dampers may hold steps short, motions from the case's start tell (`auto`)."""
         usual = self._usual
         if not self.may_simulate_to_choose:
             return usual
-        from mdstopo.general.stiffness import held_short
+        from mdstopo.general.stiffness import held_short, windows_held_short
 
-        explicit = method_of(ADAPTIVE, self.case.solver)
+        if usual[0] == SMOOTH:
+            held = self._held(SMOOTH, windows_held_short)
+            if not held:
+                return usual
+            name, why = choose(self.case.solver, self.beyond)
+            usual = name, f"{why}; {held}"
+        held = self._held(ADAPTIVE, held_short)
+        return (STIFF, held) if held else usual
+
+    def _held(self, name: str, told: "Callable[[GeneralDriver, FloatArray], str]") -> str:
+        """Of the first load case in which steps of an integrator are held short what tells so; else drivers stay."""
+        method = method_of(name, self.case.solver)
         drivers = {
-            load_case: self._made(load_case, explicit) for load_case, looked in self._by_load_case.items() if looked
+            load_case: self._made(load_case, method) for load_case, looked in self._by_load_case.items() if looked
         }
         for driver in drivers.values():
-            held = held_short(cast("GeneralDriver", driver), self.computed(self._design.take(self.case.start)))
+            held: str = told(cast("GeneralDriver", driver), self.computed(self._design.take(self.case.start)))
             if held:
-                return STIFF, held
+                return held
         self._drivers.update(drivers)
-        return usual
+        return ""
 
     def driver(self, name: str) -> SceneDriver:
         """The buffers and compiled entries of one load case, made at their first use."""
@@ -428,7 +439,7 @@ class Evaluator:
     def may_simulate_to_choose(self) -> bool:
         """Whether `auto` simulates the case's start to choose an integrator."""
         chooses = self.case.solver.integrator == AUTO and self.case.solver.step is None
-        if not chooses or self._usual[0] != ADAPTIVE or self.case.dimension > 2:
+        if not chooses or not self.beyond or self._usual[0] not in (ADAPTIVE, SMOOTH) or self.case.dimension > 2:
             return False
         from mdstopo.general.variables import has_damping
 

@@ -78,7 +78,7 @@ def variants(general: bool) -> list[Variant]:
         made = method_of(name, SolverSettings())
         if general:
             loaded: Any = entries_of(kind)
-            scenes = [PLANAR_SCENE] * (not kind.free_only) + [SPATIAL_SCENE] * (not kind.planar)
+            scenes = [PLANAR_SCENE] + [SPATIAL_SCENE] * (not kind.planar)
         elif kind.springs:
             loaded, scenes = importlib.import_module(kind.springs), [PLANAR_SCENE]
         else:

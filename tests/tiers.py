@@ -69,6 +69,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "general/test_contact.py": ("agree[solver1]", "equation[0.0001-1e-06", "equation[0.0001-1e-08", "equation[1e-05"),
     "general/test_crush.py": ("agree[solver1]",),
     "general/test_expression_laws.py": ("alpha", "in_space_are_slopes[hunt_crossley"),
+    "general/test_gauss_in_plane.py": ("tilted", "fourteen", "however_long", "explicit_or_implicit"),
     "general/test_gradients.py": ("agree[everything-",),
     "general/test_integrands.py": ("zero_are_those_of_the_values[0.3",),
     "general/test_joints_in_motion.py": ("shares_the_load[generalized_alpha",),

@@ -19,8 +19,7 @@ class IntegratorKind(NamedTuple):
     by itself. order: of the error of fixed steps in their length.
     explicit: whether stages follow from those before them. has_radius: whether it takes a spectral radius; iterative:
     whether the iterative sensitivity method is defined on its steps. free_only: whether its steps carry free bodies and
-    smooth forces alone (`scene.family.beyond_collocation`), and of general scenes those in space. planar: whether its
-    steps carry bodies in a plane alone.
+    smooth forces alone (`scene.family.beyond_collocation`). planar: whether its steps carry bodies in a plane alone.
     """
 
     name: str
@@ -44,8 +43,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
     for kind in (
         IntegratorKind(
             "gauss",
-            "adaptive collocation at Gauss nodes; for springs between free bodies and their energy, and in space for "
-            "free bodies between which forces are smooth",
+            "adaptive collocation at Gauss nodes; for free bodies between which forces are smooth",
             "mdstopo.integrators.choice:gauss",
             springs="mdstopo.integrators.gauss_entry",
             general="mdstopo.general.gauss_entry",
@@ -90,8 +88,8 @@ SMOOTH, ADAPTIVE, FIXED, STIFF = "gauss", "runge_kutta", "generalized_alpha", "e
 def names(_: bool = False) -> dict[str, str]:
     """The words of `solver.integrator` with what they mean."""
     auto = (
-        "gauss where it goes: free bodies, in a plane springs and their energy; else runge_kutta, or esdirk where "
-        "stability holds most steps short; the reason is printed"
+        "gauss for free bodies between which forces are smooth; else, or where dampers hold its steps short, "
+        "runge_kutta, or esdirk where stability holds most steps short; the reason is printed"
     )
     return {AUTO: auto, **{kind.name: kind.doc for kind in INTEGRATORS.values()}}
 

@@ -12,7 +12,7 @@ much more than `TURN`.
 
 import numpy as np
 
-from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.first_step import motion_scale
 from mdstopo.general.gauss_window import (
@@ -37,6 +37,7 @@ from mdstopo.integrators.gauss import FIRST_LEVEL, LONGEST, caution
 from mdstopo.integrators.rows import integrate_to_nodes, take_rows
 from mdstopo.integrators.steps import (
     ACCEPTED,
+    HELD_SHORT,
     NEEDS_ROOM,
     NEWTON,
     NEWTON_FAILED,
@@ -95,6 +96,12 @@ def widest_turn(model, x):
             square += x[first + r] ** 2
         most = max(most, square)
     return np.sqrt(most)
+
+
+@part
+def _may_turn(model, angle, most):
+    """Whether a window may turn a body by an angle (rad): rotation vectors up to so much only, angles in a plane."""
+    return rotations(model) == 1 or angle <= most
 
 
 @kernel
@@ -455,7 +462,9 @@ def _solve_window(
         balance_nodes(model, member_state, segment, one, np.bool_(False), q0, rel0, workspace, history, o, nodes, work)
     predict(model, planes, h, o, history, nodes)
     turned = widest_turn(model, nodes.x[s - 1])
-    if turned < 3.0:
+    if turned >= 3.0 and fixed_step <= 0.0:
+        return NEWTON_FAILED, s, h / turned
+    if _may_turn(model, turned, 3.0):
         window_state(model, q0, nodes.x[s - 1], nodes.start, nodes.q[s - 1], nodes.v[s - 1])
         relative_pose(model, nodes.q[s - 1], nodes.v[s - 1], nodes.rel[s - 1])
         for p in range(model.pair.shape[0]):
@@ -463,14 +472,13 @@ def _solve_window(
             scale[p] = max(motion[p], reached, 1e3 * noise[p])
         motion_weights(model, nodes.rel[s - 1], scale, weights)
         weigh_turns(model, weights, weight)
-    elif fixed_step <= 0.0:
-        return NEWTON_FAILED, s, h / turned
     e = solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, 1e-2, accuracy, work)
     if e < 0.0:
+        work[HELD_SHORT] += 1
         return NEWTON_FAILED, s, 0.5 * h
     previous = np.inf
     for newton in range(1, PASSES + 1):
-        if widest_turn(model, nodes.x[s - 1]) > 4.0:
+        if not _may_turn(model, widest_turn(model, nodes.x[s - 1]), 4.0):
             return NEWTON_FAILED, s, 0.25 * h
         take_rows(nodes.x, s, nodes.ref_x)
         take_rows(nodes.y, s, nodes.ref_y)
@@ -482,6 +490,7 @@ def _solve_window(
         _weigh(model, nodes.q[s - 1], nodes.rel[0], nodes.reached, noise, tolerance, scale, weights, weight)
         e = solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, 1e-3, accuracy, work)
         if e < 0.0:
+            work[HELD_SHORT] += 1
             return NEWTON_FAILED, s, 0.5 * h
         integrate_to_nodes(planes[_LEGENDRE], s, s, 1.0, nodes.none, nodes.none, planes[0, 0], nodes.u, nodes.coef)
         estimate = _tail(nodes.coef, weight, s, h) * caution(nodes.coef, weight, s) * lasting(h, longest)

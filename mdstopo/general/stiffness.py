@@ -1,8 +1,9 @@
-"""Whether explicit steps are held short by stability: what a motion in them tells, from which `auto` chooses.
+"""Whether dampers hold steps short, and not accuracy: what a motion in them tells, from which `auto` chooses.
 
 A damper or a contact with friction that acts much faster than anything moves lets explicit steps be only so long,
 however little accuracy asks for; the method measures that (`integrators.steps.decay_rate`). Where it holds for most
-steps and for many, implicit ones are fewer by more than each costs.
+steps and for many, implicit ones are fewer by more than each costs. Windows of collocation are held as short, because
+the sweeps that solve their equations do not contract, and each costs more than an explicit step.
 """
 
 from typing import TYPE_CHECKING
@@ -16,6 +17,21 @@ if TYPE_CHECKING:
 
 #: steps of a motion that have to be held short, and their share, before implicit ones pay; steps that tell enough
 MANY, MOST, ENOUGH = 4000, 0.5, 8000
+#: windows of collocation that have to be held short before explicit steps pay; windows that tell enough
+MANY_WINDOWS, ENOUGH_WINDOWS = 50, 500
+
+
+def windows_held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
+    """In words that windows of collocation of a design alpha (N,) are held short; or nothing."""
+    driver.allow(ENOUGH_WINDOWS)
+    try:
+        driver.run(alpha, False)
+    finally:
+        driver.allow(MAX_STEPS)
+    held, windows = int(driver.work[HELD_SHORT]), int(driver.work[ACCEPTED])
+    if held < max(MOST * windows, MANY_WINDOWS):
+        return ""
+    return f"dampers hold {held} of {windows} windows of collocation short"
 
 
 def held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:

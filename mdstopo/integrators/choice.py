@@ -14,7 +14,7 @@ def choose(solver: SolverSettings, beyond: str = "", collocates: bool = False) -
     """Name of the integrator and the reason, as a sentence without a full stop.
 
     beyond: what in the case goes beyond springs between free bodies, in words. collocates: whether collocation carries
-    it, and is faster (`scene.family.collocates`).
+    it (`scene.family.collocates`).
     """
     if solver.integrator != AUTO:
         return solver.integrator, "as the case says"

@@ -44,7 +44,8 @@ FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, SWEEPS, REVERSE, DESIGN, SPRINGS =
 #: steps that were rejected; where within a step a member switches; samples of responses; states inside steps and
 #: responses there, as at peaks
 OF_STARTS, OF_REJECTED, OF_SWITCHES, OF_SAMPLES, OF_POINTS = range(9, 14)
-#: of explicit methods, the accepted steps that were held short by stability (`decay_rate`)
+#: of explicit methods, the accepted steps that were held short by stability (`decay_rate`); of windows of collocation
+#: of general scenes those that were tried and too long for their sweeps to contract
 HELD_SHORT = 14
 WORK = 15
 

@@ -1,6 +1,6 @@
 """The optimiser's piece for rows that compete, as steps of the driver: begin at an iterate, judge a trial, propose one.
 
-Everything between two steps is in `State`. What is solved, and how, is in `competing_rows`.
+Everything between two steps is in `GsaoState`. What is solved, and how, is in `competing_rows`.
 """
 
 import numpy as np

@@ -67,8 +67,8 @@ def beyond_collocation(case: Case) -> str:
 
 
 def collocates(case: Case) -> bool:
-    """Whether a case that goes beyond springs is one for steps of collocation: free bodies in space, smooth forces."""
-    return case.dimension > 2 and not beyond_collocation(case)
+    """Whether a case that goes beyond springs is one for steps of collocation: free bodies, smooth forces."""
+    return not beyond_collocation(case)
 
 
 def _law(group: MemberGroup) -> str:

@@ -35,12 +35,12 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
     beyond = beyond_springs(case)
     solver = case.solver
     kind = INTEGRATORS.get(solver.integrator)
-    if kind is not None and beyond and kind.free_only and case.dimension > 2:
+    if kind is not None and beyond and kind.free_only:
         refused = beyond_collocation(case)
     elif kind is not None and kind.planar and case.dimension > 2:
         refused = "bodies in space"
     else:
-        goes = kind is None or (kind.general and not kind.free_only if beyond else kind.springs)
+        goes = kind is None or (kind.general if beyond else kind.springs)
         refused = "" if goes else beyond or "springs between free bodies"
     if kind is not None and refused:
         what = refused

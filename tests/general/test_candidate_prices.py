@@ -56,6 +56,12 @@ def arm(law=None, **more):
     }  # fmt: skip
 
 
+def free(law=None, **more):
+    """The same without hinges and a motion of the sled, which collocation carries."""
+    scene = arm(law, **more)
+    return {"title": "free"} | {key: value for key, value in scene.items() if key not in ("joints", "motions")}
+
+
 def in_space(law=None, **more):
     """A mast on a ball joint, pushed and turned; candidates from it to a grid on the ground."""
     return {
@@ -148,6 +154,8 @@ SMOOTH = {
     "energy of springs": arm({**SPRING, "free_length": 0.7}, **ENERGY),
     "with a stop": arm(**STOP),
     "two load cases": arm(**TWICE),
+    "free": free(),
+    "free and damped": free({**SPRING, "damping": 7, "preload": 2}, **looked("energy", "mean")),
     "in space": in_space(),
     "damped in space": in_space({**SPRING, "damping": 7, "preload": 2}, **ENERGY),
     "energy in space": in_space(**looked("energy", "mean")),

@@ -308,12 +308,7 @@ REFUSED = [
     ({"design": {"lower": 0, "shared": ["struts"]}}, "members.struts.candidates", "design.shared"),
     ({"solver": {"sensitivity": "direct"}}, "members.struts.candidates", "adjoint, not direct"),
     ({"solver": {"settle": True}}, "members.struts.candidates", "static settling"),
-    (
-        {"solver": {"integrator": "gauss"},
-         "uncertainty": {"parameters": {"bodies.engine.mass": {"uniform": {"from": 9, "to": 11}}}, "sample": 2}},
-        "solver.integrator", "gauss does not compute priced candidates of an uncertain case; runge_kutta does",
-    ),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("changes", "key", "words"), REFUSED, ids=[words for _, _, words in REFUSED])

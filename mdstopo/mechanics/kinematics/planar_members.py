@@ -14,6 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import inline, kernel, part
 from mdstopo.compiler.padding import whole_vectors
+from mdstopo.mechanics.kinematics.planar_grids import grid_designs, grid_sums
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
 from mdstopo.mechanics.laws.alike import (
     alike_damping,
@@ -194,18 +195,48 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
 @part
 def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, o):
     """Forces, energy and tangents of springs; see `kinematics_interface.spring_sums`."""
-    member = model.member
+    rel = r.reshape((1, 1, r.shape[0]))
+    sums = o.reshape((1, 1, o.shape[0]))
+    spring_sums_at_poses(
+        model, p, start, count, row, counted, member_state, rel, np.int64(0), np.int64(1), np.bool_(tangent), sums
+    )
+
+
+@kernel
+def spring_sums_at_poses(model, p, start, count, row, counted, member_state, rel, pair, poses, tangent, sums):
+    """The same at many poses; see `kinematics_interface.spring_sums_at_poses`."""
     stop = start + whole_vectors(count)
-    width = member.shape[1]
-    rows = member.reshape(member.size)
+    width = model.member.shape[1]
+    rows = model.member.reshape(model.member.size)
     scale = member_state.reshape(member_state.size)
+    grid = row > 0 and p[0] != 0.0
+    if grid:
+        grid_sums(rows, width, scale, start, count, row, p, rel, pair, poses, np.bool_(counted), tangent, sums)
+    for j in range(poses):
+        r = rel[j, pair]
+        o = sums[j, pair]
+        if not grid:
+            _springs_of_no_grid(rows, width, scale, start, stop, p, r, counted, tangent, o)
+        if tangent and p[1] != 0.0:
+            alike_damping(rows, width, scale, start, stop, p, r, o)
+
+
+@part
+def _springs_of_no_grid(rows, width, scale, start, stop, p, r, counted, tangent, o):
+    """`spring_sums`, but for what damping does to tangents, of members anywhere.
+
+    In:
+      rows (6 M,), width: of `GeneralModel.member`, its rows behind each other, and the width of each.
+      scale (M or more,), start, stop, p, r: as of `laws.alike`.
+      counted: whether energies are wanted. tangent: whether K is.
+    Out:
+      o (SUMS,): added to.
+    """
     c = p[0]
     if p[1] != 0.0 or p[2] != 0.0:
         alike_sums(rows, width, scale, start, stop, p, r, counted, o)
         if tangent:
             alike_tangent(rows, width, scale, start, stop, p, r, o)
-            if p[1] != 0.0:
-                alike_damping(rows, width, scale, start, stop, p, r, o)
     elif tangent:
         x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r, np.bool_(True))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
@@ -213,13 +244,6 @@ def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, 
     else:
         x, y, t, e = elastic_force(rows, width, scale, start, stop, r, np.bool_(True))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
-
-
-@part
-def spring_sums_at_poses(model, p, start, count, row, counted, member_state, rel, pair, poses, tangent, sums):
-    """The same at many poses; see `kinematics_interface.spring_sums_at_poses`."""
-    for j in range(poses):
-        spring_sums(model, p, start, count, row, counted, member_state, rel[j, pair], tangent, sums[j, pair])
 
 
 @kernel
@@ -249,7 +273,10 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     """`member_designs` of springs at many poses; see `kinematics_interface.spring_designs`."""
     width = model.member.shape[1]
     rows = model.member.reshape(model.member.size)
-    elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
+    if row > 0:
+        grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, out)
+    else:
+        elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
 
 
 @part

@@ -24,7 +24,7 @@ from mdstopo.mechanics.laws.sums import upper_triangle
 
 
 @kernel
-def _seen(ax, ay, room, j):
+def seen_in_row(ax, ay, room, j):
     """r, L^2 and 1/L of the members of row j."""
     rx = ax + room[j, 0]
     ry = ay + room[j, 1]
@@ -73,7 +73,7 @@ def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room
     sum_t = zero()
     energy = zero()
     ax, ay = turned_columns(qx, qy, first, r[2], r[3])
-    seen = _seen(ax, ay, room, np.int64(0))
+    seen = seen_in_row(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
         bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
         moved = moved_columns(qx, qy, i, r) if close else nothing_moved
@@ -81,13 +81,13 @@ def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room
         own_y = zero()
         at = i
         for j in range(1, room.shape[0]):
-            following = _seen(ax, ay, room, j)
+            following = seen_in_row(ax, ay, room, j)
             w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
             own_x += w * seen[0]
             own_y += w * seen[1]
             at += width
             seen = following
-        following = _seen(bx, by, room, np.int64(0))
+        following = seen_in_row(bx, by, room, np.int64(0))
         w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
         own_x += w * seen[0]
         own_y += w * seen[1]
@@ -243,18 +243,18 @@ def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, ro
     sums = no_columns()
     energy = zero()
     ax, ay = turned_columns(qx, qy, first, r[2], r[3])
-    seen = _seen(ax, ay, room, np.int64(0))
+    seen = seen_in_row(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
         bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
         moved = moved_columns(qx, qy, i, r) if close else nothing_moved
         own = no_members()
         at = i
         for j in range(1, room.shape[0]):
-            following = _seen(ax, ay, room, j)
+            following = seen_in_row(ax, ay, room, j)
             own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
             at += width
             seen = following
-        following = _seen(bx, by, room, np.int64(0))
+        following = seen_in_row(bx, by, room, np.int64(0))
         own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
         seen = following
         sums = add_column(sums, ax, ay, own)
@@ -285,7 +285,7 @@ def _add(own, energy, seen, moved, k, l0, excess, at, close):
 
 
 @kernel
-def _seen_at(turned, room, j, m):
+def seen_at(turned, room, j, m):
     """r, L^2 and 1/L of the members of row j at pose m."""
     rx = load(turned[m, 0], 0) + room[j, m, 0]
     ry = load(turned[m, 1], 0) + room[j, m, 1]
@@ -294,7 +294,7 @@ def _seen_at(turned, room, j, m):
 
 
 @kernel
-def _moved_at(turned, m):
+def moved_at(turned, m):
     """What `moved_columns` gave at pose m."""
     return load(turned[m, 2], 0), load(turned[m, 3], 0), load(turned[m, 4], 0)
 
@@ -359,20 +359,20 @@ def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, 
                 store(turned[m, 3], 0, twice_y)
                 store(turned[m, 4], 0, u2)
         at = i
-        seen = _seen_at(turned, room, np.int64(0), np.int64(0))
+        seen = seen_at(turned, room, np.int64(0), np.int64(0))
         for j in range(rows):
             free = load(l0, at)
             work = zero()
             for m in range(1, many):
-                following = _seen_at(turned, room, j, m)
-                work += _work(seen, _moved_at(turned, m - 1), room[j, m - 1], free, excess, at, close[m - 1])
+                following = seen_at(turned, room, j, m)
+                work += _work(seen, moved_at(turned, m - 1), room[j, m - 1], free, excess, at, close[m - 1])
                 seen = following
             if many > 0:
-                following = _seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
-                work += _work(seen, _moved_at(turned, many - 1), room[j, many - 1], free, excess, at, close[many - 1])
+                following = seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
+                work += _work(seen, moved_at(turned, many - 1), room[j, many - 1], free, excess, at, close[many - 1])
                 seen = following
             for m in range(many, poses):
-                stretch = _stretch(_seen_at(turned, room, j, m), _moved_at(turned, m), free, excess, at, close[m])
+                stretch = _stretch(seen_at(turned, room, j, m), moved_at(turned, m), free, excess, at, close[m])
                 work += 0.5 * weight[m - many] * stretch * stretch
             store(out, at, load(out, at) + load(k, at) * work)
             at += width
