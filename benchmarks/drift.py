@@ -155,7 +155,9 @@ def _in_plane(motion: Trajectory) -> _Seen:
     q, v = (x.reshape(len(motion.t), -1, 3) for x in (motion.q, motion.v))
     places, velocities, rates = np.zeros((3, *q.shape))
     places[..., :2], velocities[..., :2], rates[..., 2] = q[..., :2], v[..., :2], v[..., 2]
-    turns = Rotation.from_euler("z", q[..., 2].ravel()).as_matrix().reshape(*q.shape, 3)
+    angles = np.zeros(q.shape)
+    angles[..., 2] = q[..., 2]
+    turns = Rotation.from_rotvec(angles.reshape(-1, 3)).as_matrix().reshape(*q.shape, 3)
     return places, turns, velocities, rates, 0.0
 
 
