@@ -11,8 +11,8 @@ from scipy.optimize import least_squares
 from mdstopo.bench.tables import Table, verdict
 from mdstopo.case.measurements import Measured
 from mdstopo.case.reader import read_case
-from mdstopo.fit.problem import FitProblem
-from mdstopo.fit.solve import COST, SLOPE, STEP, Minimum, fitted, minimum
+from mdstopo.fit.fit_problem import FitProblem
+from mdstopo.fit.least_squares import COST, SLOPE, STEP, Minimum, fitted, minimum
 from mdstopo.fit.statistics import statistics
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from mdstopo import Evaluation, evaluate, load_case
 from mdstopo.bench.tables import Table, verdict
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 
 FOLDERS = (CASES, Path(__file__).resolve().parent.parent / "tests" / "general" / "cases")
 SOLVER = {"solver.integrator": "runge_kutta", "solver.tolerance": "1e-11"}

@@ -13,7 +13,7 @@ from benchmarks.scenes import CASES
 from mdstopo import load_case, optimize, simulate
 from mdstopo.plots.scenery import PRESENT, ends_at, hull, points_of, sizes, start_state
 from mdstopo.plots.style import COLOURS
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from mdstopo.bench.scenes import plate
 from mdstopo.bench.tables import Table, spread, verdict
 from mdstopo.bench.timing import interleaved
 from mdstopo.case.reader import read_case
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 
 TOLERANCE = "1e-8"
 INTEGRATORS = ("gauss", "runge_kutta")

@@ -1,7 +1,7 @@
 """The arrays that kernels work on as Markdown, from the tables by which they are packed (`mdstopo.compiler.fields`)."""
 
 from mdstopo.compiler.fields import Fields
-from mdstopo.general.model import FIELDS as GENERAL
+from mdstopo.general.general_model import FIELDS as GENERAL
 from mdstopo.general.step_history import FIELDS as HISTORY
 from mdstopo.integrators.steps import ARRAYS as STEPS
 from mdstopo.scene.packing import FIELDS as SPRINGS

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from mdstopo.case.definitions import DefinedName, Definitions
 from mdstopo.case.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.kinds import NUMBER, Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
-from mdstopo.case.laws.expression import Parameters
+from mdstopo.case.laws.expression_law import Parameters
 from mdstopo.case.mesh_files import MeshFaces, MeshFile
 from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
 from mdstopo.case.records import ByDepth, ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector

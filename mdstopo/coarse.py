@@ -9,7 +9,7 @@ displacements nor the largest speeds change much; where a vibration is not resol
 import numpy as np
 
 from mdstopo.integrators.scene_driver import SceneDriver
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 from mdstopo.status import Status
 
 #: change, relative to what half the step gives, from which a step is far too large

@@ -18,17 +18,17 @@ from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
 from mdstopo.case.sensitivities import SENSITIVITIES, chosen
 from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
-from mdstopo.integrators.choice import choose, method_of
+from mdstopo.integrators.integrator_choice import choose, method_of
 from mdstopo.integrators.scene_driver import DriverOptions, Method, ResponseResult, Scene, SceneDriver
 from mdstopo.integrators.steps import WORK, work_named
 from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.border import border_of
 from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs, collocates
-from mdstopo.scene.modes import Modes
 from mdstopo.scene.origin import extent_of, origin_of, seen_from, starting_places
 from mdstopo.scene.refusals import no_derivatives, refusals
 from mdstopo.scene.settled import Settled
+from mdstopo.scene.vibration_modes import Modes
 from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.sensitivity.springs_driver import SPRINGS
 from mdstopo.status import Status

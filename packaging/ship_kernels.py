@@ -37,14 +37,15 @@ from mdstopo.compiler import store
 from mdstopo.compiler.entry import DTYPES, Entry, types_of
 from mdstopo.compiler.threads import cores
 from mdstopo.general.entries import entries_of
-from mdstopo.integrators.choice import method_of
+from mdstopo.integrators.integrator_choice import method_of
 
 HERE = Path(__file__).resolve().parent
 TABLE = HERE / "entries.txt"
 #: shares of the work on one kind of processor. Entries for scenes in space have functions of their own inside, so two
 #: processes do little twice
 SPACE, REST = "space", "rest"
-#: the integers of a packed scene: in a plane, and in space, which is known by their dimensions (`general.model`)
+#: the integers of a packed scene: in a plane, and in space, which is known by their dimensions
+#: (`general.general_model`)
 PLANAR_SCENE, SPATIAL_SCENE = "q1", "q2"
 
 

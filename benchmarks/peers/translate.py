@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.peers.problem import GROUND, Floats, Problem
 from benchmarks.peers.space_problem import SpatialProblem
-from mdstopo.case.joints.spatial import SphericalJoint
+from mdstopo.case.joints.joints_in_space import SphericalJoint
 from mdstopo.case.model import Case, Joint, RevoluteJoint, SpringLaw
 
 

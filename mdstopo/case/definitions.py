@@ -16,10 +16,10 @@ from mdstopo.case.reading import BAD, Reading, found
 from mdstopo.case.scalars import to_float
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, shown
-from mdstopo.formula.errors import FormulaError
+from mdstopo.formula.formula_error import FormulaError
+from mdstopo.formula.formula_values import finite_value
 from mdstopo.formula.parser import WORD, Formula, parse, reserved
 from mdstopo.formula.tree import names_in
-from mdstopo.formula.values import finite_value
 
 SECTION = "define"
 #: text that begins so is an expression

@@ -12,7 +12,7 @@ from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside
-from mdstopo.formula.errors import FormulaError
+from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.parser import TIME, parse
 
 if TYPE_CHECKING:

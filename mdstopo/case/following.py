@@ -14,9 +14,9 @@ import numpy as np
 from mdstopo.case.aims import Following, Follows
 from mdstopo.case.arrays import FloatArray
 from mdstopo.formula.calculus import derivative, substituted
+from mdstopo.formula.formula_values import value_of, values_of
 from mdstopo.formula.parser import parse
 from mdstopo.formula.tree import COMPARISONS, Expression, name, names_in, number, parts
-from mdstopo.formula.values import value_of, values_of
 
 #: what jumps where its operands do not
 _JUMPS = ("sign", "step", *COMPARISONS)

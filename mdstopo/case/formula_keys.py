@@ -10,7 +10,7 @@ from mdstopo.case.nodes import MAPPING, SCALAR, Node
 from mdstopo.case.reading import BAD, Reading, found
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, shown
-from mdstopo.formula.errors import FormulaError
+from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.parser import TIME, WORD, parse, reserved
 
 

@@ -44,8 +44,8 @@ INTEGRATORS: dict[str, IntegratorKind] = {
         IntegratorKind(
             "gauss",
             "adaptive collocation at Gauss nodes; for free bodies between which forces are smooth",
-            "mdstopo.integrators.choice:gauss",
-            springs="mdstopo.integrators.gauss_entry",
+            "mdstopo.integrators.integrator_choice:gauss",
+            springs="mdstopo.integrators.springs_gauss_entry",
             general="mdstopo.general.gauss_entry",
             adaptive=True,
             free_only=True,
@@ -53,8 +53,8 @@ INTEGRATORS: dict[str, IntegratorKind] = {
         IntegratorKind(
             "runge_kutta",
             "explicit and adaptive; for everything",
-            "mdstopo.integrators.choice:runge_kutta",
-            springs="mdstopo.integrators.runge_kutta_entry",
+            "mdstopo.integrators.integrator_choice:runge_kutta",
+            springs="mdstopo.integrators.springs_runge_kutta_entry",
             general="mdstopo.general.runge_kutta_entry",
             adaptive=True,
             explicit=True,
@@ -62,8 +62,8 @@ INTEGRATORS: dict[str, IntegratorKind] = {
         IntegratorKind(
             "generalized_alpha",
             "implicit, fixed steps; for stiff scenes and the paper's figures",
-            "mdstopo.integrators.choice:generalized_alpha",
-            springs="mdstopo.integrators.generalized_alpha_entry",
+            "mdstopo.integrators.integrator_choice:generalized_alpha",
+            springs="mdstopo.integrators.springs_generalized_alpha_entry",
             general="mdstopo.general.generalized_alpha_entry",
             finds_step=True,
             has_radius=True,
@@ -72,7 +72,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
         IntegratorKind(
             "esdirk",
             "implicit, adaptive and L-stable, of order 4; for stiff contacts and dampers in a plane",
-            "mdstopo.integrators.choice:esdirk",
+            "mdstopo.integrators.integrator_choice:esdirk",
             general="mdstopo.general.esdirk",
             adaptive=True,
             order=4,

@@ -17,9 +17,9 @@ from mdstopo.case.candidates import coefficients_of, lengths_between
 from mdstopo.case.design_variables import prices
 from mdstopo.case.model import GROUND, AnyBody, Case, MemberGroup, MovablePoints, PointGrid, Variable, VolumeRow
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.rotations import frame_with, unit
-from mdstopo.case.spatial_grids import check_grid
+from mdstopo.case.spatial_point_grids import check_grid
 from mdstopo.case.start_geometry import Frames, frames_of, in_range
+from mdstopo.case.start_rotations import frame_with, unit
 from mdstopo.case.words import inside, number_text
 
 #: how far from its region a point may be at first, relative to the size of the coordinates

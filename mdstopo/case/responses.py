@@ -139,14 +139,15 @@ def _of_joint(word: str, keys: Fields, _: Frames, __: Reading) -> Response:
 def _point(word: str, unit: str, order: int) -> ResponseKind:
     keys = _AT_POINT if order else with_since(_AT_POINT)
     return ResponseKind(
-        word=word, doc="of a point", unit=unit, kernels="mdstopo.general.responses:OF_POINT", keys=keys, made=_at_point,
+        word=word, doc="of a point", unit=unit, kernels="mdstopo.general.general_responses:OF_POINT", keys=keys,
+        made=_at_point,
         order=order, is_position=order == 0, of_point=True, depends_on_rate=order > 0,
     )  # fmt: skip
 
 
 def _angle(word: str, unit: str, order: int) -> ResponseKind:
     return ResponseKind(
-        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.responses:OF_ANGLE", keys=_OF_ANGLE,
+        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.general_responses:OF_ANGLE", keys=_OF_ANGLE,
         made=_of_angle, order=order, is_position=order == 0, depends_on_rate=order > 0,
     )  # fmt: skip
 
@@ -210,7 +211,7 @@ RESPONSES: dict[str, ResponseKind] = {
             word="energy",
             doc="stored energy, in J: the sum of alpha^mu V over the design members whose laws act",
             unit="J",
-            kernels="mdstopo.general.responses:OF_ENERGY",
+            kernels="mdstopo.general.general_responses:OF_ENERGY",
             depends_on_rate=False,
             is_energy=True,
         ),
@@ -224,7 +225,7 @@ RESPONSES: dict[str, ResponseKind] = {
             word="member_force",
             doc="the largest force in a group's members",
             unit="N",
-            kernels="mdstopo.general.responses:OF_MEMBERS",
+            kernels="mdstopo.general.general_responses:OF_MEMBERS",
             keys=_OF_GROUP,
             made=_of_group,
             of_members=True,
@@ -233,7 +234,7 @@ RESPONSES: dict[str, ResponseKind] = {
             word="joint_force",
             doc="the force that a joint transmits",
             unit="N",
-            kernels="mdstopo.general.responses:OF_JOINT_FORCE",
+            kernels="mdstopo.general.general_responses:OF_JOINT_FORCE",
             keys=_OF_JOINT,
             made=_of_joint,
         ),
@@ -241,7 +242,7 @@ RESPONSES: dict[str, ResponseKind] = {
             word="joint_moment",
             doc="the couple that a joint transmits",
             unit="N m",
-            kernels="mdstopo.general.responses:OF_JOINT_MOMENT",
+            kernels="mdstopo.general.general_responses:OF_JOINT_MOMENT",
             keys=_OF_JOINT,
             made=_of_joint,
         ),

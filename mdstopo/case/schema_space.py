@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mdstopo.case.joints.joint import record_of
-from mdstopo.case.joints.spatial import SPATIAL_JOINTS
+from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
 from mdstopo.case.joints.spatial_keys import DIRECTION, POINT, TRIPLE
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind
 from mdstopo.case.mesh_files import MeshFile

@@ -1,6 +1,7 @@
 """The methods of differentiation that a case may name: what is declared of each, one record a method.
 
-What a record names differentiates what a driver has found, and stands in `sensitivity.methods` and `general.methods`.
+What a record names differentiates what a driver has found, and stands in `sensitivity.springs_methods` and
+`general.methods`.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class SensitivityKind(NamedTuple):
         return not self.springs
 
 
-_SPRINGS, _GENERAL = "mdstopo.sensitivity.methods", "mdstopo.general.methods"
+_SPRINGS, _GENERAL = "mdstopo.sensitivity.springs_methods", "mdstopo.general.methods"
 
 #: the methods by their name; the first is that of cases that name none
 SENSITIVITIES: dict[str, SensitivityKind] = {

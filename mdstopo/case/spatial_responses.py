@@ -19,9 +19,9 @@ from mdstopo.case.responses import (
     sees_itself,
     with_since,
 )
-from mdstopo.case.rotations import unit
 from mdstopo.case.schema_frame import FRAME
 from mdstopo.case.start_geometry import Frames
+from mdstopo.case.start_rotations import unit
 from mdstopo.case.words import inside
 
 _COMPONENTS = explained({"x": "along x", "y": "along y", "z": "along z", "norm": "the length of the vector"})
@@ -107,7 +107,7 @@ def _point(word: str) -> ResponseKind:
 
 def _turn(word: str, unit: str, order: int) -> ResponseKind:
     return ResponseKind(
-        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.responses:OF_TURN", keys=_OF_TURN,
+        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.general_responses:OF_TURN", keys=_OF_TURN,
         made=_of_turn, order=order, is_position=order == 0, depends_on_rate=order > 0, jumps=order == 0,
     )  # fmt: skip
 
@@ -127,7 +127,7 @@ SPATIAL_RESPONSES: dict[str, ResponseKind] = {
             word="tilt",
             doc="of an axis of a body",
             unit="rad",
-            kernels="mdstopo.general.responses:OF_TILT",
+            kernels="mdstopo.general.general_responses:OF_TILT",
             keys=_OF_TILT,
             made=_of_tilt,
             is_position=True,

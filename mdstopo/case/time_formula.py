@@ -12,7 +12,7 @@ from mdstopo.case.nodes import MAPPING, Node
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import ByShape, Key, ListOf, Record
 from mdstopo.case.words import inside
-from mdstopo.formula.errors import FormulaError
+from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.parser import TIME, parse
 
 #: a number, and behind it an operator or nothing

@@ -295,7 +295,7 @@ def _say_fit(output: Output, case: "Case") -> None:
     """What `mdstopo fit` estimates, and of which measurements."""
     if case.fit is None:
         return
-    from mdstopo.case.units import words
+    from mdstopo.case.response_units import words
 
     output.say(f"{len(case.fit.numbers)} numbers to fit")
     rows = [["number", "initial", "lower", "upper"]]

@@ -20,7 +20,7 @@ FEWEST = 10.0
 
 
 class Modes(Protocol):
-    """`scene.modes.Modes`."""
+    """`scene.vibration_modes.Modes`."""
 
     @property
     def squares(self) -> Floats: ...

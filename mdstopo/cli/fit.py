@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from mdstopo.case.model import Case
-    from mdstopo.fit.problem import FitProblem
+    from mdstopo.fit.fit_problem import FitProblem
     from mdstopo.fit.run_fit import FitRun
     from mdstopo.store.result_reader import ResultView
 
@@ -87,7 +87,7 @@ def command(
 
         needed = "the key 'fit' is missing: it says what is estimated and what was measured"
         raise CaseError([case.marks.mistake("", needed)], str(case_path))
-    from mdstopo.fit.record import content
+    from mdstopo.fit.fit_record import content
     from mdstopo.store.admit import prepare_place
     from mdstopo.store.atomic import remove_leftovers
     from mdstopo.store.lock import Lock
@@ -152,10 +152,10 @@ def _fitted(
     output: where it is said what happens.
     stop: whether to end.
     """
+    from mdstopo.fit.fit_problem import FitProblem
+    from mdstopo.fit.fit_record import FitFile
     from mdstopo.fit.fitted_case import fitted_text
     from mdstopo.fit.prepared import prepared
-    from mdstopo.fit.problem import FitProblem
-    from mdstopo.fit.record import FitFile
     from mdstopo.fit.run_fit import FitRun, run_fit
     from mdstopo.store.atomic import replace_file
     from mdstopo.store.checkpoint import Checkpointer
@@ -229,7 +229,7 @@ def _check_fitted(fitted_place: Path, place: Path, case: "Case", overwrite: bool
 
 def _restored(problem: "FitProblem", before: "ResultView") -> "FitRun":
     """The run that is gone on with; refuses that of another case or of other measurements."""
-    from mdstopo.fit.record import asked, content
+    from mdstopo.fit.fit_record import asked, content
     from mdstopo.fit.run_fit import restored
     from mdstopo.store.store_errors import StoreError
 
@@ -255,7 +255,7 @@ def _remarks(run: "FitRun") -> list[str]:
     if run.statistics is None:
         return []
     told = []
-    from mdstopo.fit.solve import stated_deviations
+    from mdstopo.fit.least_squares import stated_deviations
 
     known = not math.isnan(float(stated_deviations(run.problem).max()))
     if known and run.problem.fit.loss == "linear" and run.statistics.freedom > 0:

@@ -10,7 +10,7 @@ Content = Mapping[str, Any]
 
 
 def say_fit(output: Output, content: Content) -> None:
-    """Estimates, what the data cannot tell, what is left of each series. content: of `fit.record.content`."""
+    """Estimates, what the data cannot tell, what is left of each series. content: of `fit.fit_record.content`."""
     if "value" in content["estimates"][0]:
         output.table(_estimate_rows(content))
         for sentence in (*undetermined(content), *correlated(content)):

@@ -51,7 +51,7 @@ def command(
     if not all(math.isfinite(value) for value in tilt) or not any(axis):
         raise click.BadParameter("an axis of three finite numbers, not all zero, and an angle", param_hint="--tilt")
     from mdstopo.case.reader import load_case
-    from mdstopo.finalize.lift import lifted
+    from mdstopo.finalize.lift_case import lifted
     from mdstopo.store.atomic import replace_file
     from mdstopo.store.store_errors import StoreError
 

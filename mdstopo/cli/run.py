@@ -222,7 +222,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     import numpy as np
 
     from mdstopo.case.model import VolumeRow
-    from mdstopo.case.units import words
+    from mdstopo.case.response_units import words
     from mdstopo.case.words import count_text
     from mdstopo.cli.show import values_text
     from mdstopo.scene.moving_volumes import spent

@@ -44,7 +44,7 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
     if view.kind == "sweep":
         _say_sweep(output, view)
     if view.kind == "fit":
-        from mdstopo.fit.record import content as fit_of
+        from mdstopo.fit.fit_record import content as fit_of
 
         fit = {"fit": fit_of(view)}
         say_fit(output, fit["fit"])

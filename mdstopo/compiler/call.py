@@ -11,9 +11,9 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
+from mdstopo.compiler.compiled_units import Provided
 from mdstopo.compiler.entry import DIMENSIONS, DTYPES, EXCUSE, LENGTHS, NUMBERS, PLAIN
 from mdstopo.compiler.store import CALL, PREPARED, Code, cache_folder
-from mdstopo.compiler.units import Provided
 
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)

@@ -67,7 +67,8 @@ from numba.experimental.structref import _Utils as _Structure
 from numba.extending import lower_builtin, overload
 from numba.np.arrayobj import fix_integer_index, load_item, store_item
 
-from mdstopo.compiler import threads, units
+from mdstopo.compiler import compiled_units as units
+from mdstopo.compiler import threads
 from mdstopo.compiler.entry import EXCUSE, LENGTHS, NUMBERS
 from mdstopo.compiler.numba_plain import numba_type
 from mdstopo.compiler.store import CALL, PREPARED, Code, cache_folder, read_checked, write_checked
@@ -444,7 +445,8 @@ if not _LEAN:
     _LEANER = {}
 
 # Libraries
-# What is kept of a function while an entry is compiled: its intermediate code without that of what it calls (`units`).
+# What is kept of a function while an entry is compiled: its intermediate code without that of what it calls
+# (`compiled_units`).
 #
 # Numba makes machine code of every function, and optimises each with all that it calls. Here only entries are called
 # from outside. What an entry reaches is linked into it once, and a function at body level (`jit.kernel`) is optimised
@@ -457,7 +459,7 @@ if not _LEAN:
 class Optimised(JITCodeLibrary):
     """Intermediate code of a function with all that it calls, optimised, but for long ones that have been optimised.
 
-    split: all long functions that it calls are left out, and called by their symbols (`units`).
+    split: all long functions that it calls are left out, and called by their symbols (`compiled_units`).
     """
 
     split = False

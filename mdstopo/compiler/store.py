@@ -53,7 +53,8 @@ class Code(NamedTuple):
 
     body, glue: object files, of the entry and of the function that calls it. result: a letter for each number that it
     returns (i integer, f float, b truth), in parentheses for a tuple, which is empty where it returns nothing. needs:
-    names of files with what it calls by symbols; such a file has no glue, and its symbol for a result (`units`).
+    names of files with what it calls by symbols; such a file has no glue, and its symbol for a result
+    (`compiled_units`).
     """
 
     body: bytes

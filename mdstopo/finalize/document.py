@@ -28,7 +28,7 @@ from mdstopo.case.words import inside
 from mdstopo.finalize.apart import free_name
 from mdstopo.finalize.names import following_law, kept_expressions
 from mdstopo.finalize.scaled_laws import sized as sized_law
-from mdstopo.finalize.values import Given, bound_of, differ, given, never_late, with_values
+from mdstopo.finalize.sized_laws import Given, bound_of, differ, given, never_late, with_values
 from mdstopo.store.store_errors import StoreError
 
 Plain = dict[str, Any]

@@ -20,7 +20,7 @@ from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.equilibria import Comparison, compare_equilibria
 from mdstopo.finalize.keep import check, check_restricted, chosen, kept_values, one_alpha, places, restricted
 from mdstopo.finalize.names import with_names_fixed
-from mdstopo.finalize.values import Parameter, told_apart
+from mdstopo.finalize.sized_laws import Parameter, told_apart
 from mdstopo.scene.refusals import refusals
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.run_session import run_session

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import Table
-from mdstopo.case.laws.expression import OfFormulas
+from mdstopo.case.laws.expression_law import OfFormulas
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Law
 

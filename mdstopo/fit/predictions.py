@@ -15,7 +15,7 @@ from mdstopo.case.model import Case
 from mdstopo.engine import Evaluator
 from mdstopo.fit.numbers import DIFFERENCES, SHIFT_OF_MOTIONS, Numbers
 from mdstopo.general.general_driver import GeneralDriver
-from mdstopo.general.model import GeneralModel
+from mdstopo.general.general_model import GeneralModel
 from mdstopo.general.observed import Observed, observe, slopes
 from mdstopo.status import Status
 

@@ -7,7 +7,7 @@ from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case, MemberGroup, Objective, Variable
 from mdstopo.case.reader import read_case
 from mdstopo.case.words import inside
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 #: a parameter of a law: group, place of the law, parameter
 LawPlace = tuple[str, int, str]

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.fit.problem import FitProblem
-from mdstopo.fit.profile import Profile, profile
-from mdstopo.fit.solve import Evaluated, Minimum, StoppedError, fitted, minimum, starts
+from mdstopo.fit.fit_problem import FitProblem
+from mdstopo.fit.least_squares import Evaluated, Minimum, StoppedError, fitted, minimum, starts
+from mdstopo.fit.profile_likelihood import Profile, profile
 from mdstopo.fit.statistics import Statistics, statistics
 
 #: fits whose levels differ by less than this, relative to the number of values, have found the same minimum

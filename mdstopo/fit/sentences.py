@@ -8,7 +8,7 @@ CORRELATED = 0.95
 
 
 def undetermined(content: Mapping[str, Any]) -> list[str]:
-    """What the data cannot tell, or hardly: a sentence for each combination of estimates. content: of `record`."""
+    """What the data cannot tell, or hardly: a sentence for each combination of estimates. content: of `fit_record`."""
     found = []
     for each in content["directions"] or ():
         parts = " ".join(f"{share:+.2g} {name}" for name, share in each["shares"].items())
@@ -18,7 +18,7 @@ def undetermined(content: Mapping[str, Any]) -> list[str]:
 
 
 def correlated(content: Mapping[str, Any]) -> list[str]:
-    """Which estimates vary together: a sentence for each pair. content: of `record`."""
+    """Which estimates vary together: a sentence for each pair. content: of `fit_record`."""
     names = [each["name"] for each in content["estimates"]]
     return [
         f"{names[j]} and {names[i]} vary together: correlation {both:.4g}"

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.fit.problem import FitProblem
-from mdstopo.fit.solve import Minimum, loss, stated_deviations
+from mdstopo.fit.fit_problem import FitProblem
+from mdstopo.fit.least_squares import Minimum, loss, stated_deviations
 
 #: singular values below this share of the largest are none
 NOTHING = 1e-6

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+from mdstopo.formula.formula_values import value_of
 from mdstopo.formula.tree import NAME, NUMBER, Expression, number, operation, parts
-from mdstopo.formula.values import value_of
 
 ZERO, ONE, TWO = number(0.0), number(1.0), number(2.0)
 

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from mdstopo.formula.calculus import ONE, ZERO, is_number, substituted
-from mdstopo.formula.modes import bit
+from mdstopo.formula.formula_values import value_of
+from mdstopo.formula.smooth_modes import bit
 from mdstopo.formula.tree import NAME, NUMBER, Expression, names_in, operation, parts
-from mdstopo.formula.values import value_of
 
 #: sides that are kept at most, and sides that are evaluated
 MOST, LOOKS = 8, 100

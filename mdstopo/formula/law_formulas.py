@@ -20,7 +20,9 @@ from mdstopo.formula.calculus import (
     substituted,
 )
 from mdstopo.formula.idle import Idle, idle_sides
-from mdstopo.formula.modes import (
+from mdstopo.formula.parser import parse
+from mdstopo.formula.sharp import sharp_switches
+from mdstopo.formula.smooth_modes import (
     HALF,
     MOST_SWITCHES,
     MOTION,
@@ -31,8 +33,6 @@ from mdstopo.formula.modes import (
     smooth,
     ways_to,
 )
-from mdstopo.formula.parser import parse
-from mdstopo.formula.sharp import sharp_switches
 from mdstopo.formula.tree import NUMBER, Expression, name, names_in, number, operation, parts
 
 #: groups that stand before those of parameters: the force, and the smallest margin

@@ -17,7 +17,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
-from mdstopo.formula.errors import FormulaError
+from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.tree import COMPARISONS, FUNCTIONS, Expression, name, number, operation
 
 LONGEST = 5000

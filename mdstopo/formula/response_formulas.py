@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from mdstopo.formula.calculus import ONE, call, derivative, is_number, substituted
 from mdstopo.formula.law_formulas import Group, by_place, group_of, limited, lowest_of
-from mdstopo.formula.modes import smooth
 from mdstopo.formula.parser import TIME, parse
+from mdstopo.formula.smooth_modes import smooth
 from mdstopo.formula.tree import NUMBER, Expression, name, names_in
 
 #: group of the value and its slope by t; that of the smallest margin; the first of those with slopes by responses

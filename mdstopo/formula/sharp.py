@@ -10,8 +10,8 @@ import math
 import random
 from collections.abc import Sequence
 
+from mdstopo.formula.formula_values import value_of
 from mdstopo.formula.tree import NUMBER, Expression, names_in, parts
-from mdstopo.formula.values import value_of
 
 #: a power from here on begins smoothly enough for steps of any length
 SMOOTH = 4.0

@@ -9,10 +9,10 @@ import functools
 from typing import NamedTuple
 
 from mdstopo.formula.calculus import ONE, derivative, substituted
+from mdstopo.formula.formula_values import value_of
 from mdstopo.formula.law_formulas import Group, by_place, group_of, limited, lowest_of
-from mdstopo.formula.modes import smooth
 from mdstopo.formula.parser import TIME, parse
-from mdstopo.formula.values import value_of
+from mdstopo.formula.smooth_modes import smooth
 
 #: group of value, rate and second derivative; that of the smallest margin; those of a switch: margin, rate, evaluated
 VALUE, LOWEST, MARGIN = 0, 1, 2

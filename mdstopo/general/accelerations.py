@@ -20,8 +20,8 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.forces import add_inerters, add_tangents_of_inerters, general_forces
+from mdstopo.general.general_model import JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
 from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
-from mdstopo.general.model import JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
 from mdstopo.general.strides import (
     first_freedom,
     pair_freedoms,

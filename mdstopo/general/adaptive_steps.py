@@ -46,8 +46,8 @@ from mdstopo.general.step_history import (
     copy_vector,
     keep_state,
 )
-from mdstopo.integrators.runge_kutta import MOST
 from mdstopo.integrators.runge_kutta_tables import INSIDE
+from mdstopo.integrators.springs_runge_kutta import MOST
 from mdstopo.integrators.steps import (
     ACCEPTED,
     CHATTERING,

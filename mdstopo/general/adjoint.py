@@ -20,11 +20,8 @@ from mdstopo.general.accelerations import (
 from mdstopo.general.extremes import FRACTION, RATE, STEP, WHO
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
-from mdstopo.general.method_interface import point_of, step_back, weights_of
-from mdstopo.general.model import KIND, SUBJECT
-from mdstopo.general.parameters import add_event, add_times, event_slope
-from mdstopo.general.permanent_sets import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
-from mdstopo.general.responses import (
+from mdstopo.general.general_model import KIND, SUBJECT
+from mdstopo.general.general_responses import (
     MEMBER_FORCE,
     across_rate,
     across_slopes,
@@ -40,6 +37,9 @@ from mdstopo.general.responses import (
     response,
     value_at,
 )
+from mdstopo.general.method_interface import point_of, step_back, weights_of
+from mdstopo.general.parameters import add_event, add_times, event_slope
+from mdstopo.general.permanent_sets import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES
 from mdstopo.mechanics.kinematics.kinematics_interface import difference, retract

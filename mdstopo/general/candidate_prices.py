@@ -2,7 +2,7 @@
 
 What prices follow from is found first (`pricing_states`). The members of a group lie between the points of two grids;
 here all of them are gone through, tile by tile, of which a few numbers are kept (as in
-`sensitivity.candidate_prices`), or single ones.
+`sensitivity.springs_candidate_prices`), or single ones.
 
 No step ends at a switch of a member of alpha = 0. So one whose law switches is followed through the steps by its
 elongation at some nodes of each. Where it leaves its mode within a step, the sum over stages, which is for smooth
@@ -18,8 +18,8 @@ import numpy as np
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.compiler.threads import shared, taken
+from mdstopo.general.general_model import INERTER, MEMBER_EXCESS, MEMBER_FREE_LENGTH, unpack_general
 from mdstopo.general.members import MODE
-from mdstopo.general.model import INERTER, MEMBER_EXCESS, MEMBER_FREE_LENGTH, unpack_general
 from mdstopo.general.structures import bundle
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     has_spring_energies,
@@ -30,7 +30,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     spring_designs,
     spring_energies,
 )
-from mdstopo.mechanics.laws.table import (
+from mdstopo.mechanics.laws.law_table import (
     SPRING,
     law,
     law_first_set,
@@ -40,8 +40,8 @@ from mdstopo.mechanics.laws.table import (
     law_set,
     law_start,
 )
-from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.sensitivity.candidate_prices import BROAD, TALL, sum_tile
+from mdstopo.scene.springs_model import FloatArray, IndexArray
+from mdstopo.sensitivity.springs_candidate_prices import BROAD, TALL, sum_tile
 
 #: candidates of a tile, and of a call of `price_places`
 PLACES = TALL * BROAD
@@ -90,7 +90,7 @@ class PricedCandidates(NamedTuple):
         ),
     ]
     rest: Annotated[FloatArray, Field("n_run", "the law's free length (m); negative: the length as stated")]
-    law: Annotated[FloatArray, Field("n_run, 8", "its parameters (`mechanics.laws.table`)")]
+    law: Annotated[FloatArray, Field("n_run, 8", "its parameters (`mechanics.laws.law_table`)")]
     curves: Annotated[FloatArray, Field("n_scene, n_curve", "numbers of the scene's laws")]
     pose: Annotated[FloatArray, Field("n_state, 1, n_pose", "relative pose of the group's bodies, and its rates")]
     change: Annotated[FloatArray, Field("n_state, 1, n_free", "minus the virtual change of the pose")]
@@ -168,7 +168,7 @@ def price_tiles(ints, floats, candidate_ints, candidate_floats, common, built, p
 
     In:
       ints, floats, candidate_ints, candidate_floats: as of `price_places`.
-      common (COMMON,): what candidates have in common, as of `sensitivity.candidate_prices`.
+      common (COMMON,): what candidates have in common, as of `sensitivity.springs_candidate_prices`.
       built (T + 1,), places (any,): by tile, where in it candidates are that do not count.
       threads: that share the work.
     Out:

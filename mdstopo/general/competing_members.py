@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.general.extremes import FRACTIONS, row_of
-from mdstopo.general.model import COUNT, GROUP, OFFSET, SUBJECT
+from mdstopo.general.general_model import COUNT, GROUP, OFFSET, SUBJECT
+from mdstopo.general.general_responses import MEMBER_FORCE
 from mdstopo.general.peak_search import ALIKE, EVEN, MARGIN
-from mdstopo.general.responses import MEMBER_FORCE
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

@@ -12,10 +12,10 @@ from mdstopo.general.accelerations import joint_slopes, make_workspace, solve_ac
 from mdstopo.general.extremes import FRACTION, STEP, WHO
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, explicit_part, force_sign
+from mdstopo.general.general_model import unpack_general
+from mdstopo.general.general_responses import design_slopes, energy_weight, response
 from mdstopo.general.members import unscale_general
 from mdstopo.general.method_interface import point_of
-from mdstopo.general.model import unpack_general
-from mdstopo.general.responses import design_slopes, energy_weight, response
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import most_rows

@@ -8,7 +8,7 @@ from mdstopo.case.model import AnyContact, Case, Contact, SurfaceContact
 from mdstopo.general.dimension import Frames, Pairs, in_frame
 from mdstopo.mechanics.contact import CONTACT
 from mdstopo.mechanics.kinematics.spatial_contacts import CYLINDER, PLANE, RECTANGLE, SPHERE, WIDTH
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: the codes of surfaces by their words
 SHAPES = {"plane": PLANE, "rectangle": RECTANGLE, "sphere": SPHERE, "cylinder": CYLINDER}

@@ -6,9 +6,8 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.method_interface import beside, derivatives, is_continuous, is_explicit, point_of
-from mdstopo.general.model import SUBJECT, unpack_general
-from mdstopo.general.responses import (
+from mdstopo.general.general_model import SUBJECT, unpack_general
+from mdstopo.general.general_responses import (
     APART,
     chosen_part,
     follows_state,
@@ -18,6 +17,7 @@ from mdstopo.general.responses import (
     is_plain,
     rated,
 )
+from mdstopo.general.method_interface import beside, derivatives, is_continuous, is_explicit, point_of
 from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.structures import bundle

@@ -8,7 +8,7 @@ from mdstopo.case.model import Case, Joint, Load, LoadCase, Response
 from mdstopo.general.timed_loads import TimedPart
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.loads import Loads
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: body name -> what turns points of its axes, as rows, into the axes that arrays have; a body that is missing has the
 #: same ones

@@ -12,9 +12,7 @@ from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
 from mdstopo.general.extremes import COLUMNS, FRACTION, STEP, WHO
 from mdstopo.general.forces import inerter_force
-from mdstopo.general.members import MODE, SCALE, SET, level_of, unscale_general
-from mdstopo.general.method_interface import step_forward
-from mdstopo.general.model import (
+from mdstopo.general.general_model import (
     CODE,
     COUNT,
     DESIGN,
@@ -29,13 +27,15 @@ from mdstopo.general.model import (
     VARIED_VALUE,
     unpack_general,
 )
+from mdstopo.general.members import MODE, SCALE, SET, level_of, unscale_general
+from mdstopo.general.method_interface import step_forward
 from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
 from mdstopo.general.permanent_sets import count_sets, sets_forward, through_sets, time_forward
 from mdstopo.general.scene_numbers import balance_slope, begin_velocities, number_through_step
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, carve_history, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import member_rows
-from mdstopo.mechanics.laws.table import FREE_LENGTH, law
+from mdstopo.mechanics.laws.law_table import FREE_LENGTH, law
 
 
 @kernel

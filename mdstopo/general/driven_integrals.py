@@ -30,7 +30,7 @@ from mdstopo.mechanics.kinematics.timed import (
     SCALE,
     WEIGHTS,
 )
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: which derivative of a coordinate is prescribed
 DERIVATIVES = dict(zip(KINDS, (ACCELERATION, RATE, COORDINATE), strict=True))

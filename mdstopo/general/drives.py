@@ -17,8 +17,8 @@ from mdstopo.general.driven_integrals import integrated_ends, row_of_motion
 from mdstopo.general.timed_loads import at_ends, modes
 from mdstopo.mechanics.kinematics.spatial_drives import FRAME, ROW
 from mdstopo.mechanics.kinematics.timed import WIDTH
-from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.signals import segment_values
+from mdstopo.scene.signal_segments import segment_values
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 
 class Drives(NamedTuple):

@@ -23,8 +23,8 @@ from mdstopo.general.accelerations import (
     subtract_matrices,
 )
 from mdstopo.general.adaptive_steps import run_adaptive
+from mdstopo.general.general_model import unpack_general
 from mdstopo.general.method_interface import UNSOLVED, implement
-from mdstopo.general.model import unpack_general
 from mdstopo.general.run_start import ROUNDING, scene_size
 from mdstopo.general.runge_kutta_sensitivity import COMMON
 from mdstopo.general.step_history import carve_history, copy_vector, keep_stage

@@ -17,9 +17,9 @@ import math
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.contact import contact_switch
+from mdstopo.general.general_contact import contact_switch
+from mdstopo.general.general_model import CODE, COUNT, INERTER, MEMBER_FREE_LENGTH, PAIR, START, STOP
 from mdstopo.general.members import MODE, SCALE, SET
-from mdstopo.general.model import CODE, COUNT, INERTER, MEMBER_FREE_LENGTH, PAIR, START, STOP
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -33,7 +33,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     stretch_of,
     turning_rate,
 )
-from mdstopo.mechanics.laws.table import (
+from mdstopo.mechanics.laws.law_table import (
     law_grazes,
     law_has_pieces,
     law_margin,

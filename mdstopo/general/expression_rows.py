@@ -5,7 +5,7 @@ from mdstopo.case.expression_response import program_of
 from mdstopo.case.responses import kind_of
 from mdstopo.compiler.formulas import address_of
 from mdstopo.general.expressions import BALANCED, BY_STATE, ENERGETIC, EXPRESSION, FORCED, ROOT, TIMED
-from mdstopo.general.responses import LISTED, code_of
+from mdstopo.general.general_responses import LISTED, code_of
 
 
 def expression_codes(response: Response, first: int) -> list[int]:

@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.compiler.formulas import call_formula
 from mdstopo.compiler.jit import kernel
 from mdstopo.formula.response_formulas import SLOPES, VALUE, WIDTH
-from mdstopo.general.model import BODY, COMPONENT, REFERENCE, SUBJECT
+from mdstopo.general.general_model import BODY, COMPONENT, REFERENCE, SUBJECT
 
 #: code of an expression among the kinds of responses
 EXPRESSION = -1

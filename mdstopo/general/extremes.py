@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mdstopo.general.expressions import MARGINS
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 #: columns of a row: time, value, step, fraction of it, rate on this side, sign of what is largest, member; and where
 #: two members change hands there (`minima`), the other one and its share of the derivative

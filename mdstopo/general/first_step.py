@@ -10,8 +10,8 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
+from mdstopo.general.general_model import CODE, COUNT, PAIR, START
 from mdstopo.general.members import SCALE
-from mdstopo.general.model import CODE, COUNT, PAIR, START
 from mdstopo.general.strides import first_freedom
 from mdstopo.integrators.steps import FORCES, TURN
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -29,7 +29,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     retract,
     rounding_of_pairs,
 )
-from mdstopo.mechanics.laws.table import law_is_given, law_unstretched
+from mdstopo.mechanics.laws.law_table import law_is_given, law_unstretched
 
 #: balances at most; the theta that is small enough to tell tau, the one that is aimed at, and the one from which on it
 #: tells nothing: it cannot be larger than 3, as the motion's size has the change of the accelerations in it

@@ -8,9 +8,9 @@ F holds loads, gravity, members, bushings, and the part of an inerter's force th
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.contact import add_contacts
+from mdstopo.general.general_contact import add_contacts
+from mdstopo.general.general_model import CODE, COUNT, INERTER, PAIR, START
 from mdstopo.general.members import SCALE, general_sums
-from mdstopo.general.model import CODE, COUNT, INERTER, PAIR, START
 from mdstopo.general.strides import FORCE, pair_freedoms, place_in_pair, sums_size, tangent_column
 from mdstopo.general.switches import APART, DAMPED, TURNING
 from mdstopo.mechanics.kinematics.kinematics_interface import (

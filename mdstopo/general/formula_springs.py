@@ -5,13 +5,13 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from mdstopo.case.laws.cubic import CubicLaw
-from mdstopo.case.laws.expression import OfFormulas, names_of
-from mdstopo.case.laws.spring import SpringLaw
+from mdstopo.case.laws.cubic_law import CubicLaw
+from mdstopo.case.laws.expression_law import OfFormulas, names_of
+from mdstopo.case.laws.spring_law import SpringLaw
 from mdstopo.case.model import Case, Law, MemberGroup
 from mdstopo.formula.law_formulas import FORCE
 from mdstopo.formula.tree import NAME, NUMBER, Expression, parts
-from mdstopo.mechanics.laws.table import COMMON
+from mdstopo.mechanics.laws.law_table import COMMON
 
 #: products of names, each with its factor
 Polynomial = dict[tuple[str, ...], Fraction]

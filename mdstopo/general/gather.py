@@ -5,8 +5,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.expressions import FIRST_PART
 from mdstopo.general.forces import inerter_force
-from mdstopo.general.members import MODE, SET, level_of, rate_of_row
-from mdstopo.general.model import (
+from mdstopo.general.general_model import (
     CODE,
     COUNT,
     DESIGN,
@@ -20,8 +19,9 @@ from mdstopo.general.model import (
     START,
     SUBJECT,
 )
+from mdstopo.general.general_responses import MEMBER_FORCE, member_force
+from mdstopo.general.members import MODE, SET, level_of, rate_of_row
 from mdstopo.general.parameters import add_force_parameters, add_parameters
-from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.general.scene_numbers import add_numbers
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
@@ -41,7 +41,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     turn_bodies,
     turned_pose,
 )
-from mdstopo.mechanics.laws.table import SPRING, law
+from mdstopo.mechanics.laws.law_table import SPRING, law
 
 
 @kernel

@@ -1,10 +1,11 @@
 """Gauss collocation of a general scene without joints and events, adaptive: windows of nested numbers of nodes.
 
-What a window is, and its equations, stands in `gauss_window`; how they are solved is told in `integrators.gauss`: a
-first pass with seven nodes, each further one with more until the coefficients of u have decayed below the tolerance,
-then as many as Newton's corrections need. The last correction is solved for but not balanced once more: the slopes that
-are kept belong to states that are off by it, by at most a part of the tolerance on adaptive windows and by 1e-10 on
-fixed ones, whose discrete adjoint (`gauss_sensitivity`) is the exact derivative of what was computed.
+What a window is, and its equations, stands in `gauss_window`; how they are solved is told in
+`integrators.springs_gauss`: a first pass with seven nodes, each further one with more until the coefficients of u have
+decayed below the tolerance, then as many as Newton's corrections need. The last correction is solved for but not
+balanced once more: the slopes that are kept belong to states that are off by it, by at most a part of the tolerance on
+adaptive windows and by 1e-10 on fixed ones, whose discrete adjoint (`gauss_sensitivity`) is the exact derivative of
+what was computed.
 
 A window begins with a balance at its start, at the loads of its middle, which predicts its motion. It turns no body by
 much more than `TURN`.
@@ -26,15 +27,15 @@ from mdstopo.general.gauss_window import (
     solve_nodes,
     spread_balance,
 )
+from mdstopo.general.general_model import KIND, unpack_general
+from mdstopo.general.general_responses import ENERGY
 from mdstopo.general.generalized_alpha_step import rate_of
 from mdstopo.general.members import MODE, SET, meeting, scale_general, shortest_at_home
-from mdstopo.general.model import KIND, unpack_general
-from mdstopo.general.responses import ENERGY
 from mdstopo.general.run_start import motion_at_start
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, copy_vector, keep_state
 from mdstopo.integrators.driver import LOOSE_NEWTON, NEWTON_TOLERANCE
-from mdstopo.integrators.gauss import FIRST_LEVEL, LONGEST, caution
 from mdstopo.integrators.rows import integrate_to_nodes, take_rows
+from mdstopo.integrators.springs_gauss import FIRST_LEVEL, LONGEST, caution
 from mdstopo.integrators.steps import (
     ACCEPTED,
     HELD_SHORT,

@@ -21,7 +21,6 @@ from mdstopo.general.gauss_window import (
 )
 from mdstopo.general.method_interface import implement
 from mdstopo.general.step_history import COEFFICIENT, FIRST, U, X, Y, copy_vector
-from mdstopo.integrators.gauss_linear import _point_weights, _polynomials
 from mdstopo.integrators.rows import (
     add_products,
     combine_rows,
@@ -32,6 +31,7 @@ from mdstopo.integrators.rows import (
     row_width,
     take_rows,
 )
+from mdstopo.integrators.springs_gauss_linear import _point_weights, _polynomials
 from mdstopo.integrators.steps import REVERSE, SWEEPS
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     window_jvp,

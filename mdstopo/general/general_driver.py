@@ -13,7 +13,7 @@ from mdstopo.case.responses import kind_of
 from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.competing_members import compete, members_peaks
-from mdstopo.general.compile import GeneralScene, compile_general
+from mdstopo.general.compile_general import GeneralScene, compile_general
 from mdstopo.general.dimension import dimension_of
 from mdstopo.general.extremes import (
     COLUMNS,
@@ -25,14 +25,14 @@ from mdstopo.general.extremes import (
     VALUE,
     row_of,
 )
+from mdstopo.general.general_model import COUNT, GROUP, INERTER, JOINT_FIRST, OFFSET, START, GeneralModel, pack_general
+from mdstopo.general.general_responses import switches_of
 from mdstopo.general.kinks import landed
 from mdstopo.general.minima import Pieces, minima
-from mdstopo.general.model import COUNT, GROUP, INERTER, JOINT_FIRST, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.quadrature_breakpoints import ROUNDS, quadrature_breakpoints, reduced
 from mdstopo.general.ready import Ready
-from mdstopo.general.responses import switches_of
+from mdstopo.general.response_shapes import shape_of
 from mdstopo.general.row_gradients import BLOCK, RowGradients
-from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.step_history import FACTORS, GRAZES, WINDOWS, history_room
 from mdstopo.general.switch_pieces import switched_integral, switched_peaks
@@ -51,18 +51,18 @@ from mdstopo.integrators.steps import (
     WORK,
     status_of,
 )
-from mdstopo.mechanics.joints.table import describe
+from mdstopo.mechanics.joints.joint_table import describe
 from mdstopo.scene.diagnosis import fastest_body, member_in_words
-from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.modes import Modes
 from mdstopo.scene.settled import Settled
+from mdstopo.scene.springs_model import FloatArray, IndexArray
+from mdstopo.scene.vibration_modes import Modes
 from mdstopo.sensitivity.reductions import INTEGRALS
 from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.general.entries import Entries
-    from mdstopo.general.pricing import GeneralCandidates, PricingStates
+    from mdstopo.general.general_pricing import GeneralCandidates, PricingStates
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
@@ -646,7 +646,7 @@ class GeneralDriver:
 
     def pricing_states(self, factor: FloatArray) -> "PricingStates":
         """The states from which prices follow, of the rows of the last evaluation times factor (n_resp, R)."""
-        from mdstopo.general.pricing import pricing_states_of
+        from mdstopo.general.general_pricing import pricing_states_of
 
         return pricing_states_of(self, factor)
 
@@ -833,7 +833,7 @@ def _candidates(
     scenes: Mapping[str, Any], place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None
 ) -> "GeneralCandidates":
     """The candidates of a priced group; the scenes tell nothing that their cases do not."""
-    from mdstopo.general.pricing import GeneralCandidates
+    from mdstopo.general.general_pricing import GeneralCandidates
 
     del scenes
     return GeneralCandidates(place, group, homes, count)

@@ -3,12 +3,13 @@
     (1 - alpha_m) x' + alpha_m x = (1 - alpha_f) a' + alpha_f a
     q* = q + h v + h^2 ((1/2 - beta) x + beta x'),  v* = v + h ((1 - gamma) x + gamma x'),  a' = a(q*, v*, t')
 
-as in `integrators.generalized_alpha`, with a(q, v, t) from the balance with its joints: accelerations and multipliers
-are of second order like the motion. Then q*, v* are moved onto the joints (`projection`) by what they are off, which is
-of third order: no drift, and no transient at the start, because x begins where it belongs. Newton's iteration takes the
-exact tangent of the whole balance. A step that a switching member's margin does not survive ends at the event; what
-is left of the segment is divided anew. Steps do not end at the knots of curves: where the second derivative of a force
-jumps, a method of second order loses nothing, and steps that stay as they are have derivatives that are exact.
+as in `integrators.springs_generalized_alpha`, with a(q, v, t) from the balance with its joints: accelerations and
+multipliers are of second order like the motion. Then q*, v* are moved onto the joints (`projection`) by what they are
+off, which is of third order: no drift, and no transient at the start, because x begins where it belongs. Newton's
+iteration takes the exact tangent of the whole balance. A step that a switching member's margin does not survive ends at
+the event; what is left of the segment is divided anew. Steps do not end at the knots of curves: where the second
+derivative of a force jumps, a method of second order loses nothing, and steps that stay as they are have derivatives
+that are exact.
 """
 
 import numpy as np
@@ -17,6 +18,7 @@ from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.event_log import CHATTER, log_at_breakpoint, log_switches
 from mdstopo.general.events import first_sign, has_switches, room_for_watched, smallest_margin, watch_all
+from mdstopo.general.general_model import unpack_general
 from mdstopo.general.generalized_alpha_step import AUXILIARY, VELOCITY, advance, rate_of
 from mdstopo.general.locate import (
     CUTS,
@@ -30,7 +32,6 @@ from mdstopo.general.locate import (
     quintic_ends,
 )
 from mdstopo.general.members import MODE, SET, meeting, scale_general
-from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.run_start import ROUNDING, log_start, motion_at_start, scene_size, start_modes
 from mdstopo.general.step_history import (
@@ -42,7 +43,7 @@ from mdstopo.general.step_history import (
     copy_vector,
     keep_state,
 )
-from mdstopo.integrators.generalized_alpha import FEWEST
+from mdstopo.integrators.springs_generalized_alpha import FEWEST
 from mdstopo.integrators.steps import (
     ACCEPTED,
     CHATTERING,

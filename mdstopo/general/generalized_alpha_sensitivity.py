@@ -14,7 +14,7 @@ from mdstopo.general.method_interface import implement
 from mdstopo.general.projection import project_back, project_forward
 from mdstopo.general.step_history import FIRST
 from mdstopo.general.step_linear import prepare_stage_back, stage_back, stage_forward
-from mdstopo.integrators.generalized_alpha import weights_of as alpha_weights
+from mdstopo.integrators.springs_generalized_alpha import weights_of as alpha_weights
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_shift,
@@ -136,7 +136,7 @@ def _stage_row_back(
       history, w, o, j, last: the history of steps, the step, its first stage, the number of this stage in it, and of
         its last.
       h: length of the step (s).
-      weights: of the method (`integrators.generalized_alpha.weights_of`).
+      weights: of the method (`integrators.springs_generalized_alpha.weights_of`).
       bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers, or no rows.
       lam_x (2, n): cotangents of the acceleration and the auxiliary one at the end of the step.
     In and out:

@@ -6,8 +6,8 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import OF_STEP, newton_correction, solve_accelerations, subtract_matrices
 from mdstopo.general.projection import project
 from mdstopo.general.step_history import copy_vector, keep_stage
-from mdstopo.integrators.gauss_equations import CLOSELY
-from mdstopo.integrators.generalized_alpha import MOST, RESOLVED, RESTART, weights_of
+from mdstopo.integrators.springs_gauss_equations import CLOSELY
+from mdstopo.integrators.springs_generalized_alpha import MOST, RESOLVED, RESTART, weights_of
 from mdstopo.integrators.steps import FORCES, NEWTON, NEWTON_FAILED, NON_FINITE, OK, SINGULAR, TANGENTS
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     advance_coordinates,
@@ -36,7 +36,7 @@ def rate_of(model, workspace):
     x = np.empty(n)
     y = np.empty(n)
     rate = 0.0
-    for kind in range(2):  # as `integrators.gauss_equations.fastest_rate` does
+    for kind in range(2):  # as `integrators.springs_gauss_equations.fastest_rate` does
         for d in range(n):
             x[d] = np.sqrt(inverse[d]) * (1.0 + 0.1 * (d % 7))
         value = 0.0

@@ -3,8 +3,8 @@
 from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.adjoint import integral_gradient
+from mdstopo.general.general_model import unpack_general
 from mdstopo.general.members import unscale_general
-from mdstopo.general.model import unpack_general
 from mdstopo.general.step_history import carve_history
 
 

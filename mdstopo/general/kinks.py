@@ -16,12 +16,12 @@ import numpy as np
 
 from mdstopo.general.driven_integrals import integrated_ends
 from mdstopo.general.extremes import FRACTION, STEP, VALUE, EvaluateAt
+from mdstopo.general.general_model import GeneralModel
+from mdstopo.general.general_responses import has_kinks, has_norm, is_expression
 from mdstopo.general.minima import LOW, Pieces
-from mdstopo.general.model import GeneralModel
-from mdstopo.general.responses import has_kinks, has_norm, is_expression
 from mdstopo.mechanics.kinematics.timed import COORDINATE, DERIVED
-from mdstopo.scene.model import FloatArray
-from mdstopo.scene.signals import cut_linear, parents_of
+from mdstopo.scene.signal_segments import cut_linear, parents_of
+from mdstopo.scene.springs_model import FloatArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

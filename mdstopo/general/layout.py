@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mdstopo.case.model import Case
-from mdstopo.general.model import JOINT_FIRST
+from mdstopo.general.general_model import JOINT_FIRST
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: a row of which no larger share than this is independent of the others is implied by them
 INDEPENDENT = 1e-9

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from mdstopo.general.competing_members import compare, members_of
 from mdstopo.general.extremes import FRACTIONS
-from mdstopo.general.model import KIND
-from mdstopo.general.responses import MEMBER_FORCE, TIE
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.general.general_model import KIND
+from mdstopo.general.general_responses import MEMBER_FORCE, TIE
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

@@ -13,8 +13,8 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.general.events import EDGE, block_of, smallest_margin
+from mdstopo.general.general_model import CODE, MEMBER_FREE_LENGTH, PAIR
 from mdstopo.general.members import MODE, SCALE, SET
-from mdstopo.general.model import CODE, MEMBER_FREE_LENGTH, PAIR
 from mdstopo.general.step_history import copy_vector
 from mdstopo.mechanics.contact import contact_grazes
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -24,7 +24,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     relative_pose,
     stretch_of,
 )
-from mdstopo.mechanics.laws.table import (
+from mdstopo.mechanics.laws.law_table import (
     law_grazes,
     law_is_sharp,
     law_margin,

@@ -10,7 +10,17 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, larger, largest, load, zero
-from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, MEMBER_EXCESS, MEMBER_FREE_LENGTH, PAIR, ROW, START
+from mdstopo.general.general_model import (
+    CODE,
+    COUNT,
+    DESIGN,
+    INERTER,
+    MEMBER_EXCESS,
+    MEMBER_FREE_LENGTH,
+    PAIR,
+    ROW,
+    START,
+)
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import contact_start
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -24,7 +34,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     spring_sums,
     spring_sums_at_poses,
 )
-from mdstopo.mechanics.laws.table import SPRING, law, law_first_set, law_has_pieces, law_remembers, law_start
+from mdstopo.mechanics.laws.law_table import SPRING, law, law_first_set, law_has_pieces, law_remembers, law_start
 
 #: rows of `member_state` (3, M_padded + n_contact + 1): alpha^mu, the mode of a law that switches or of a contact, the
 #: permanent set of a law that remembers. The last column has the number of events that the modes include (`history`)

@@ -9,10 +9,10 @@ from mdstopo.general.extremes import RATE, SIGN, parts, row_of
 from mdstopo.general.quadrature_breakpoints import reduced
 from mdstopo.integrators.scene_driver import ResponseResult
 from mdstopo.integrators.steps import OK, status_of
-from mdstopo.scene.model import FloatArray
-from mdstopo.sensitivity.constant_load import DROPPED
-from mdstopo.sensitivity.methods import FALLBACK, implementation
+from mdstopo.scene.springs_model import FloatArray
 from mdstopo.sensitivity.reductions import INTEGRALS
+from mdstopo.sensitivity.springs_constant_load import DROPPED
+from mdstopo.sensitivity.springs_methods import FALLBACK, implementation
 from mdstopo.status import Status
 
 if TYPE_CHECKING:

@@ -27,11 +27,11 @@ from mdstopo.general.extremes import (
     row_of,
     sample,
 )
+from mdstopo.general.general_responses import has_kinks, switches_of
 from mdstopo.general.leading_members import Lead, changes, is_led, leads
-from mdstopo.general.responses import has_kinks, switches_of
 from mdstopo.general.switch_pieces import switch_leads
 from mdstopo.integrators.driver import CLOSENESS
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

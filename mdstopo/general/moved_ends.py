@@ -15,7 +15,7 @@ from mdstopo.case.model import GROUND, Case, LoadCase, MemberGroup, MovablePoint
 from mdstopo.case.movable import points_at, turned_out
 from mdstopo.case.start_geometry import frames_of
 from mdstopo.general.dimension import dimension_of, in_frame
-from mdstopo.general.model import (
+from mdstopo.general.general_model import (
     COUNT,
     FIRST_END,
     MEMBER_EXCESS,
@@ -30,8 +30,8 @@ from mdstopo.general.model import (
     GeneralModel,
 )
 from mdstopo.scene.bodies import distances, stands_as
-from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: columns of `GeneralModel.along`: a direction, in the plane of two components and a zero, and a free length's growth
 WIDTH = 4

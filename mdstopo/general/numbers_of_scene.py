@@ -15,13 +15,13 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.following import expressions_of
 from mdstopo.case.model import GROUND, Case, LoadCase
 from mdstopo.general.dimension import dimension_of
+from mdstopo.general.general_model import VARIED_COLUMNS, GeneralModel, pack_general
 from mdstopo.general.kinks import landed
 from mdstopo.general.layout import arrange
-from mdstopo.general.model import VARIED_COLUMNS, GeneralModel, pack_general
 from mdstopo.general.moved_ends import WIDTH
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.design_map import BESIDE_SCENE, CasesWith
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: the arrays of a scene that may follow from names, besides places of members and numbers of laws
 BALANCE = ("mass", "v0", "force", "load_body", "load_follows", "load_arm", "load_force", "schur_constant")

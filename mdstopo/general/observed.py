@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdstopo.general.general_driver import GeneralDriver
+from mdstopo.general.general_model import GeneralModel
 from mdstopo.general.kinks import landed
-from mdstopo.general.model import GeneralModel
 from mdstopo.integrators.steps import OK, status_of
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.status import Status
 
 #: arrays of a scene that a number may change so that `follow` differentiates by it

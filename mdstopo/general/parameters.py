@@ -31,8 +31,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.members import MODE, SCALE, SET, level_of, rate_of_row
-from mdstopo.general.model import (
+from mdstopo.general.general_model import (
     ALONG_FREE_LENGTH,
     CODE,
     DESIGN,
@@ -50,11 +49,12 @@ from mdstopo.general.model import (
     VARIED_STOP,
     VARIED_VALUE,
 )
-from mdstopo.general.responses import value_at
+from mdstopo.general.general_responses import value_at
+from mdstopo.general.members import MODE, SCALE, SET, level_of, rate_of_row
 from mdstopo.general.step_history import EVENTS, GIVEN, MEMBER, OLD, SEGMENT, SET_BEFORE, STATE, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import end_slopes, inerter_row, member_rows
-from mdstopo.mechanics.laws.table import (
+from mdstopo.mechanics.laws.law_table import (
     ACTIVE_FROM,
     ACTIVE_UNTIL,
     FREE_LENGTH,

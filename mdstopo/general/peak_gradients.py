@@ -9,8 +9,8 @@ from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.dense_output import finished
 from mdstopo.general.extremes import COLUMNS, FRACTION, NOBODY, OTHER, SIGN, STEP
+from mdstopo.general.general_model import unpack_general
 from mdstopo.general.members import unscale_general
-from mdstopo.general.model import unpack_general
 from mdstopo.general.peak_search import highest
 from mdstopo.general.row_sweep import rows_gradients
 from mdstopo.general.step_history import carve_history

@@ -28,9 +28,9 @@ from mdstopo.general.extremes import (
     VALUE,
     WHO,
 )
+from mdstopo.general.general_model import ORDER, unpack_general
+from mdstopo.general.general_responses import follows_state, kinked, needs_balance
 from mdstopo.general.method_interface import is_continuous
-from mdstopo.general.model import ORDER, unpack_general
-from mdstopo.general.responses import follows_state, kinked, needs_balance
 from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.integrators.steps import OF_POINTS, OF_SAMPLES
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic

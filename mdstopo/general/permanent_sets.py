@@ -19,8 +19,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.expressions import FIRST_PART
-from mdstopo.general.members import MODE, SCALE, SET
-from mdstopo.general.model import (
+from mdstopo.general.general_model import (
     ALONG_FREE_LENGTH,
     CODE,
     COUNT,
@@ -40,8 +39,9 @@ from mdstopo.general.model import (
     VARIED_STOP,
     VARIED_VALUE,
 )
+from mdstopo.general.general_responses import MEMBER_FORCE, energy_weight, member_force
+from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.parameters import moved_side, varies_member
-from mdstopo.general.responses import MEMBER_FORCE, energy_weight, member_force
 from mdstopo.general.scene_numbers import add_start_velocities
 from mdstopo.general.step_history import (
     EVENTS,
@@ -66,7 +66,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     pose_size,
     relative_pose,
 )
-from mdstopo.mechanics.laws.table import (
+from mdstopo.mechanics.laws.law_table import (
     ACTIVE_FROM,
     FREE_LENGTH,
     law,

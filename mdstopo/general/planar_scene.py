@@ -11,12 +11,12 @@ from mdstopo.general.contact_compile import edge_rows
 from mdstopo.general.dimension import Dimension, Frames, Pairs
 from mdstopo.general.timed_loads import TimedPart
 from mdstopo.mechanics.contact import PX, PY
-from mdstopo.mechanics.joints import table as joints
+from mdstopo.mechanics.joints import joint_table as joints
 from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.kinematics.timed import MOMENT, PUSH
-from mdstopo.scene.compile import home_of
+from mdstopo.scene.compile_scene import home_of
 from mdstopo.scene.loads import Loads, generalised_loads
-from mdstopo.scene.model import HOME_COS, FloatArray, IndexArray
+from mdstopo.scene.springs_model import HOME_COS, FloatArray, IndexArray
 
 #: numbers of a response
 RESPONSE_PAR = 4

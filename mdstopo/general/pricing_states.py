@@ -13,9 +13,9 @@ from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents, state_of_row, sweep
 from mdstopo.general.extremes import FRACTION, STEP, WHO
-from mdstopo.general.model import unpack_general
+from mdstopo.general.general_model import unpack_general
+from mdstopo.general.general_responses import design_slopes, energy_weight
 from mdstopo.general.permanent_sets import count_sets
-from mdstopo.general.responses import design_slopes, energy_weight
 from mdstopo.general.row_sweep import add_share, step_of_rows
 from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.mechanics.kinematics.kinematics_interface import (

@@ -20,7 +20,7 @@ from mdstopo.general.accelerations import (
     matrices_vjp,
     solve_unknowns,
 )
-from mdstopo.general.model import JOINT_FIRST, JOINT_PAIR, JOINT_ROWS
+from mdstopo.general.general_model import JOINT_FIRST, JOINT_PAIR, JOINT_ROWS
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.switches import DIAGONAL
 from mdstopo.mechanics.kinematics.kinematics_interface import (

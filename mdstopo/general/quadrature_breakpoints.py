@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mdstopo.general.general_responses import LISTED, has_kinks, is_expression, switches_of
 from mdstopo.general.kinks import kinks
-from mdstopo.general.responses import LISTED, has_kinks, is_expression, switches_of
 from mdstopo.general.start import size_of
 from mdstopo.general.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.sensitivity.reductions import INTEGRALS
 
 if TYPE_CHECKING:

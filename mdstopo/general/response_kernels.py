@@ -1,11 +1,12 @@
-"""How a response is computed: one record of kernels, which `responses` makes the dispatch by code of.
+"""How a response is computed: one record of kernels, which `general_responses` makes the dispatch by code of.
 
 A kernel takes what it needs of the following, in any order, by these names:
 
-    model, j          the scene's arrays (`general.model`), and which of its responses it is; `model.response_par[j]`
-                      has the point in body coordinates, where there is one, then `Response.numbers`, four at most; in
-                      space always three numbers for the point, then the others, vectors among them in the axes of
-                      arrays (`spatial_scene`); of a displacement the others are what it counts from (`since_settled`)
+    model, j          the scene's arrays (`general.general_model`), and which of its responses it is;
+                      `model.response_par[j]` has the point in body coordinates, where there is one, then
+                      `Response.numbers`, four at most; in space always three numbers for the point, then the others,
+                      vectors among them in the axes of arrays (`spatial_scene`); of a displacement the others are what
+                      it counts from (`since_settled`)
     member_state, segment (`general.members`), the stretch of time between two breakpoints
     who               of a response of members the member that is meant
     t, q, v, a, lam   a state whose balance has just been made: time, coordinates, velocities, accelerations (n,),

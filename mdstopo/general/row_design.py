@@ -9,8 +9,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import lanes
 from mdstopo.general.forces import inerter_force
-from mdstopo.general.members import SCALE, level_of, rate_of_row
-from mdstopo.general.model import (
+from mdstopo.general.general_model import (
     CODE,
     COUNT,
     DESIGN,
@@ -23,6 +22,7 @@ from mdstopo.general.model import (
     VARIED_STOP,
     VARIED_VALUE,
 )
+from mdstopo.general.members import SCALE, level_of, rate_of_row
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.scene_numbers import add_numbers_of_rows
 from mdstopo.general.step_history import has_factors
@@ -40,7 +40,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     turned_pose,
 )
 from mdstopo.mechanics.kinematics.planar_poses import copy_rows
-from mdstopo.mechanics.laws.table import FREE_LENGTH, SPRING
+from mdstopo.mechanics.laws.law_table import FREE_LENGTH, SPRING
 
 
 @kernel

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, parts
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.sensitivity.reductions import INTEGRALS
 
 if TYPE_CHECKING:

@@ -17,14 +17,14 @@ from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.adjoint import apply_saltation_transposed, row_cotangents
 from mdstopo.general.gather import add_designs
+from mdstopo.general.general_model import unpack_general
 from mdstopo.general.members import unscale_general
 from mdstopo.general.method_interface import is_explicit, step_back
-from mdstopo.general.model import unpack_general
 from mdstopo.general.parameters import add_times
 from mdstopo.general.permanent_sets import add_sets_of_rows, count_sets, keep_start
 from mdstopo.general.row_design import add_designs_of_rows
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, restore_modes
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 
 class Units(NamedTuple):

@@ -1,15 +1,16 @@
 """The explicit Runge-Kutta methods of general scenes: their stages, what estimates a step's error, and the run.
 
-The methods are those of `integrators.runge_kutta`: each stage's accelerations come from the balance with its joints.
+The methods are those of `integrators.springs_runge_kutta`: each stage's accelerations come from the balance with its
+joints.
 """
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.adaptive_steps import run_adaptive
+from mdstopo.general.general_model import unpack_general
 from mdstopo.general.method_interface import implement
-from mdstopo.general.model import unpack_general
 from mdstopo.general.step_history import carve_history
 from mdstopo.general.step_inside import make_stages
-from mdstopo.integrators import runge_kutta
+from mdstopo.integrators import springs_runge_kutta as runge_kutta
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
 
 TAG = (0,)

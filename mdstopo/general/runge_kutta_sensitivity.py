@@ -12,7 +12,7 @@ from mdstopo.general.runge_kutta import TAG
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, keep_state, restore_modes
 from mdstopo.general.step_inside import table_of_step
 from mdstopo.general.step_linear import changes_forward, steps_back
-from mdstopo.integrators.runge_kutta import MOST
+from mdstopo.integrators.springs_runge_kutta import MOST
 from mdstopo.integrators.steps import OF_POINTS
 from mdstopo.mechanics.kinematics.kinematics_interface import advance_coordinates
 

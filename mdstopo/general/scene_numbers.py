@@ -15,7 +15,7 @@ they are of second degree at most in it, as a mass times an acceleration is that
 import numpy as np
 
 from mdstopo.compiler.jit import by_type, kernel
-from mdstopo.general.model import planar_twin, spatial_twin
+from mdstopo.general.general_model import planar_twin, spatial_twin
 from mdstopo.general.step_history import FIRST
 from mdstopo.mechanics.kinematics.kinematics_interface import add_loads
 

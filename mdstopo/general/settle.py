@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.scene.model import FloatArray
 from mdstopo.scene.settled import Settled
+from mdstopo.scene.springs_model import FloatArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

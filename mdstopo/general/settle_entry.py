@@ -6,8 +6,7 @@ from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import joint_slopes, joint_state, make_workspace
 from mdstopo.general.direct import own_force
 from mdstopo.general.forces import general_forces
-from mdstopo.general.members import SCALE, scale_general, set_modes
-from mdstopo.general.model import (
+from mdstopo.general.general_model import (
     CODE,
     COUNT,
     DESIGN,
@@ -21,6 +20,7 @@ from mdstopo.general.model import (
     VARIED_VALUE,
     unpack_general,
 )
+from mdstopo.general.members import SCALE, scale_general, set_modes
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair, place_of_turn
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -31,7 +31,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     relative_pose,
     rotations,
 )
-from mdstopo.mechanics.laws.table import FREE_LENGTH
+from mdstopo.mechanics.laws.law_table import FREE_LENGTH
 
 
 @kernel

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.general.extremes import FRACTION, STEP
-from mdstopo.general.model import COMPONENT
+from mdstopo.general.general_model import COMPONENT
 from mdstopo.mechanics.kinematics.components import NORM, Z
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

@@ -5,9 +5,9 @@ import numpy as np
 from mdstopo.compiler.jit import entry, part
 from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.adjoint import integral_cotangents
-from mdstopo.general.model import BODY, unpack_general
+from mdstopo.general.general_model import BODY, unpack_general
+from mdstopo.general.general_responses import motion_component
 from mdstopo.general.permanent_sets import count_sets
-from mdstopo.general.responses import motion_component
 from mdstopo.general.step_history import FIRST, carve_history
 from mdstopo.general.strides import dimensions, first_freedom
 from mdstopo.mechanics.kinematics.components import Z

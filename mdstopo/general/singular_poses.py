@@ -102,7 +102,7 @@ def error_along(model, workspace, vectors, s, h, a, weight, whole, sigma):
       h: length of the step (s).
       a (s or more, n): accelerations at its stages (m/s^2, rad/s^2).
       weight (n,): weights of the coordinates (1/m, 1/rad; `integrators.steps.motion_weights`).
-      whole: the whole error (`integrators.runge_kutta.step_error`).
+      whole: the whole error (`integrators.springs_runge_kutta.step_error`).
       sigma: least singular value of the joints at the end of the step.
 
     Returns `whole` where that is large enough to lead to another branch.
@@ -125,6 +125,6 @@ def error_along(model, workspace, vectors, s, h, a, weight, whole, sigma):
             size[m] = max(size[m], h * h * weight[d] * abs(off[d]))
     worst = max(size[0], size[1])
     coarse = max(size[2], size[3])
-    if coarse > 0.0 and worst > 0.0:  # as in `integrators.runge_kutta.step_error`
+    if coarse > 0.0 and worst > 0.0:  # as in `integrators.springs_runge_kutta.step_error`
         worst = worst * worst / np.sqrt(worst * worst + 0.01 * coarse * coarse)
     return worst

@@ -15,7 +15,7 @@ from mdstopo.compiler.kernel import Kernel
 from mdstopo.general.contact_compile import surface_rows
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
 from mdstopo.general.timed_loads import TimedPart
-from mdstopo.mechanics.joints.kernels import FITTED
+from mdstopo.mechanics.joints.joint_kernels import FITTED
 from mdstopo.mechanics.kinematics import spatial_bushings
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.mechanics.kinematics.spatial_bushings import WIDTH as BUSHING
@@ -46,9 +46,9 @@ from mdstopo.mechanics.kinematics.spatial_joints import AT as MEETS
 from mdstopo.mechanics.kinematics.spatial_poses import HOME, HOME_AXES, HOME_PLACE, HOME_TURN
 from mdstopo.mechanics.kinematics.timed import MOMENT, PUSH
 from mdstopo.scene.loads import Loads
-from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.quaternions import principal
-from mdstopo.scene.signals import segment_values
+from mdstopo.scene.signal_segments import segment_values
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: columns of `GeneralModel.home`: a body's place, then R_home by rows, then P by rows
 PLACE, TURN, AXES = slice(HOME_PLACE, HOME_TURN), slice(HOME_TURN, HOME_AXES), slice(HOME_AXES, HOME)

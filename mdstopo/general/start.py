@@ -17,13 +17,13 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
-from mdstopo.general.model import COUNT, DESIGN, START
+from mdstopo.general.general_model import COUNT, DESIGN, START
 from mdstopo.general.since_settled import SinceSettled
-from mdstopo.mechanics.joints.table import describe
+from mdstopo.mechanics.joints.joint_table import describe
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.bodies import distances
-from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.settled import Settled
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

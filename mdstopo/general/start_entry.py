@@ -4,8 +4,8 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import joint_state, make_workspace, solve_accelerations
+from mdstopo.general.general_model import JOINT_ROWS, unpack_general
 from mdstopo.general.members import scale_general
-from mdstopo.general.model import JOINT_ROWS, unpack_general
 from mdstopo.general.projection import project
 from mdstopo.general.run_start import scene_size, start_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair, place_of_turn

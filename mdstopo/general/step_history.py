@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel
+from mdstopo.general.general_model import GeneralModel
 from mdstopo.general.members import MODE, SET
-from mdstopo.general.model import GeneralModel
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import BOTH, DAMPED, SECOND
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES, GIVEN = range(6)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from mdstopo.integrators.driver import MAX_STEPS
 from mdstopo.integrators.steps import ACCEPTED, HELD_SHORT, STEP_LIMIT
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

@@ -5,7 +5,7 @@ of these are constants, or a product with one, where a kernel is compiled.
 """
 
 from mdstopo.compiler.jit import part
-from mdstopo.general.model import JOINT_FIRST
+from mdstopo.general.general_model import JOINT_FIRST
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, rotations
 
 #: where the force begins in sums over the members of a pair (`sums_size`)

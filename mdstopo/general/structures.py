@@ -24,7 +24,7 @@ def __getattr__(name: str) -> type:
             candidate_prices,
             dense_output,
             gauss_window,
-            model,
+            general_model,
             step_history,
         )
 

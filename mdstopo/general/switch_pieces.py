@@ -14,9 +14,9 @@ import numpy as np
 
 from mdstopo.general.expressions import MARGINS
 from mdstopo.general.extremes import FRACTION, FRACTIONS, OTHER, RATE, SHARE, STEP, VALUE, WHO
+from mdstopo.general.general_responses import switches_of
 from mdstopo.general.leading_members import Lead, apart, may_vanish, roots_between
-from mdstopo.general.responses import switches_of
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

@@ -3,9 +3,9 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.model import CODE, INERTER, PAIR
+from mdstopo.general.general_model import CODE, INERTER, PAIR
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, load_slopes, rotations
-from mdstopo.mechanics.laws.table import SPRING
+from mdstopo.mechanics.laws.law_table import SPRING
 
 #: places of a workspace's `switches`: whether the mass is diagonal; whether the factors in the workspace are those of
 #: the joints' matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small

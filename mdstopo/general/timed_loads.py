@@ -1,7 +1,7 @@
 """Loads and motions that are formulas of time, as arrays of a general scene, and the times at which they have kinks.
 
-A kink or a jump of a formula is where a margin of it vanishes (`formula.modes`); there segments end, as at a row of a
-table, and in each segment the formula is the smooth one of the sides on which its switches are in the middle.
+A kink or a jump of a formula is where a margin of it vanishes (`formula.smooth_modes`); there segments end, as at a row
+of a table, and in each segment the formula is the smooth one of the sides on which its switches are in the middle.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,8 +16,8 @@ from mdstopo.compiler.formulas import FormulaCalls, address_of
 from mdstopo.formula.time_formulas import MARGIN, VALUE
 from mdstopo.general.leading_members import may_vanish, roots_between
 from mdstopo.mechanics.kinematics.timed import ADDRESS, OFFSET, SCALE, TURNS, WIDTH
-from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.signals import formulas_of, signals_of
+from mdstopo.scene.signal_segments import formulas_of, signals_of
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: parts of the simulated time in which a kink is looked for
 PARTS = 2048

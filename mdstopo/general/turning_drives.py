@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.case.model import PrescribedRotation
-from mdstopo.case.rotations import frame_along
+from mdstopo.case.start_rotations import frame_along
 from mdstopo.general.drives import cubics_of
-from mdstopo.general.model import GeneralModel
+from mdstopo.general.general_model import GeneralModel
 from mdstopo.mechanics.kinematics.spatial_drives import ROW
 from mdstopo.mechanics.kinematics.spatial_poses import COORDINATES, FREEDOMS, HOME_AXES, HOME_TURN
-from mdstopo.scene.model import FloatArray
 from mdstopo.scene.quaternions import product, rotations_of
-from mdstopo.scene.signals import segment_values
+from mdstopo.scene.signal_segments import segment_values
+from mdstopo.scene.springs_model import FloatArray
 
 #: by how much a turn of one step of the series may differ from that of two halves
 CONVERGED = 1e-13

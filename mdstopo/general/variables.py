@@ -9,16 +9,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from mdstopo.case.laws.expression import OfFormulas
+from mdstopo.case.laws.expression_law import OfFormulas
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Case, Law, LoadCase, MemberGroup, Variable
+from mdstopo.general.general_model import (
+    COUNT,
+    GROUP,
+    MEMBER_EXCESS,
+    MEMBER_FREE_LENGTH,
+    START,
+    VARIED_COLUMNS,
+    GeneralModel,
+)
 from mdstopo.general.kinks import landed
-from mdstopo.general.model import COUNT, GROUP, MEMBER_EXCESS, MEMBER_FREE_LENGTH, START, VARIED_COLUMNS, GeneralModel
 from mdstopo.general.moved_ends import WIDTH, MovedEnds, rows_of_ends
-from mdstopo.integrators.choice import has_coarse_steps
+from mdstopo.integrators.integrator_choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
-from mdstopo.mechanics.laws import table as laws
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.mechanics.laws import law_table as laws
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: parts of the simulated time, each of one step at least, where a mode may come and go by time alone
 WATCHED = 256

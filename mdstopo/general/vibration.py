@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.scene.model import FloatArray
-from mdstopo.scene.modes import Modes, modes_of
+from mdstopo.scene.springs_model import FloatArray
+from mdstopo.scene.vibration_modes import Modes, modes_of
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver

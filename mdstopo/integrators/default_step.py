@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdstopo.integrators.scene_driver import SceneDriver
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 from mdstopo.status import Status
 
 #: error aimed at, in tolerances: the promise is ten, and other designs than the measured one are less kind

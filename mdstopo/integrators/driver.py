@@ -18,9 +18,9 @@ from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, quadr
 from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, Q, V, carve, room_for, status_of
 from mdstopo.mechanics.active_members import ROOMY
-from mdstopo.scene.compile import Scene
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.compile_scene import Scene
 from mdstopo.scene.packing import Packed, pack
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.status import Status
 
 #: how near to the highest a peak competes, and how many are kept
@@ -204,7 +204,7 @@ class Driver:
 
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the strengths of the last run."""
-        from mdstopo.integrators.generalized_alpha_entry import rate_at_start
+        from mdstopo.integrators.springs_generalized_alpha_entry import rate_at_start
 
         return float(rate_at_start(self.packed.ints, self.packed.floats, self.strength, self.scene.damped))
 

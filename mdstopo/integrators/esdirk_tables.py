@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from mdstopo.integrators.runge_kutta_tables import AA, BB, E_Q, E_V, VECTORS, A, B, C
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 STAGES, ORDER = 6, 4
 #: rows of A; the last one has the weights b of the end

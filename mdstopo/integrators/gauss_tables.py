@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 AnyFloats = NDArray[np.floating[Any]]
 

@@ -16,8 +16,8 @@ import numpy as np
 from mdstopo.integrators.gauss_tables import LEGENDRE, LEVELS, gauss_tables
 from mdstopo.integrators.runge_kutta_tables import GENERAL, NYSTROEM, ORDERS, VECTORS, B, C, runge_kutta_tables
 from mdstopo.integrators.steps import ENERGY, FIRST, carve
-from mdstopo.scene.model import FloatArray, IndexArray, Model
-from mdstopo.scene.signals import cut_linear, parents_of
+from mdstopo.scene.signal_segments import cut_linear, parents_of
+from mdstopo.scene.springs_model import FloatArray, IndexArray, Model
 
 if TYPE_CHECKING:
     from mdstopo.integrators.driver import Driver

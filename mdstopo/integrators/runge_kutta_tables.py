@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 STAGES = (17, 12)
 ORDERS = (12, 8)

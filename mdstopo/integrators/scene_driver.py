@@ -10,9 +10,9 @@ from typing import Any, NamedTuple, Protocol
 from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.model import LoadCase, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Rows, Shape
-from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.modes import Modes
 from mdstopo.scene.settled import Settled
+from mdstopo.scene.springs_model import FloatArray, IndexArray
+from mdstopo.scene.vibration_modes import Modes
 from mdstopo.status import Status
 
 

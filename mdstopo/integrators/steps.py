@@ -16,7 +16,7 @@ from mdstopo.compiler.fields import Field, Fields, FloatArray, IndexArray, views
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.kinematics.planar_scales import add_gross_force
 from mdstopo.mechanics.passes import STORED
-from mdstopo.scene.model import KIND, PAIR, SCALED_PRELOAD, START, STOP
+from mdstopo.scene.springs_model import KIND, PAIR, SCALED_PRELOAD, START, STOP
 from mdstopo.status import Status
 
 #: codes that kernels return; `status_of` gives the sentence (NEEDS_ROOM never leaves the engine)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from mdstopo.integrators.scene_driver import Steps
 from mdstopo.scene.border import Border
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 from mdstopo.shown import counted, html_of
 from mdstopo.status import Status
 

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 from mdstopo.case.aims import Objective
 from mdstopo.case.model import Case
+from mdstopo.case.response_units import unit_of_value, words
 from mdstopo.case.responses import kind_of
-from mdstopo.case.units import unit_of_value, words
 from mdstopo.limiting.force_limits import restrictions
 from mdstopo.limiting.program import ImpossibleError, Program
 from mdstopo.limiting.response import Limits, NoBoundError, limits_of, objective_row
-from mdstopo.limiting.solve import UnsolvedError
+from mdstopo.limiting.solve_linear_program import UnsolvedError
 from mdstopo.limiting.system import System
 from mdstopo.scene.bodies import is_spatial
-from mdstopo.scene.signals import formulas_of
+from mdstopo.scene.signal_segments import formulas_of
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,15 @@ import numpy as np
 
 from mdstopo.limiting.known import Cubics, Floats
 from mdstopo.limiting.response import Bounded
-from mdstopo.limiting.solve import InfeasibleError, Reduced, Scales, Solution, Solve, Tangent, UnsolvedError
+from mdstopo.limiting.solve_linear_program import (
+    InfeasibleError,
+    Reduced,
+    Scales,
+    Solution,
+    Solve,
+    Tangent,
+    UnsolvedError,
+)
 from mdstopo.limiting.system import System
 
 #: cells at first and at most, along a line and in the plane, where there are many more rows

@@ -9,8 +9,8 @@ import numpy as np
 
 from mdstopo.case.aims import Objective, Response, ResponseRow
 from mdstopo.case.model import GROUND
+from mdstopo.case.response_units import words
 from mdstopo.case.responses import kind_of
-from mdstopo.case.units import words
 from mdstopo.limiting.known import Cubics, Floats
 from mdstopo.limiting.system import System
 

@@ -35,7 +35,7 @@ from mdstopo.case.model import (
 from mdstopo.general.drives import drives, motion_times
 from mdstopo.general.planar_scene import PLANE
 from mdstopo.limiting.known import Cubics, Floats, with_second_derivative
-from mdstopo.scene.signals import breakpoints, segment_values
+from mdstopo.scene.signal_segments import breakpoints, segment_values
 
 #: singular values of C below this share of the largest count as zero: C is made of unit vectors and mass shares
 _RANK = 1e-9

@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.threads import shared, taken
 from mdstopo.mechanics.passes import springs_of, threads_for
-from mdstopo.scene.model import (
+from mdstopo.scene.springs_model import (
     BLOCK,
     CHUNK_BLOCK,
     CHUNK_START,

@@ -174,7 +174,8 @@ def contact_start(c, height, rise, second, room):
 
 @inline
 def contact_grazes(c, mode):
-    """What a margin that is only just used up (or not) does to derivatives, as `law_grazes` in `mechanics.laws.table`.
+    """What a margin that is only just used up (or not) does to derivatives, as `law_grazes` in
+    `mechanics.laws.law_table`.
 
     A damped touch that only just happens leaves no derivative of the motion: 2.
     """

@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.threads import shared, taken
 from mdstopo.compiler.vector import lanes, load, store
-from mdstopo.mechanics.grids import design_grid, sum_grid
+from mdstopo.mechanics.grid_passes import design_grid, sum_grid
 from mdstopo.mechanics.kinematics.planar_poses import POSE, copy_rows, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.spring import (
     elastic_design,
@@ -24,7 +24,7 @@ from mdstopo.mechanics.laws.spring import (
     viscous_tangent,
 )
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.scene.model import (
+from mdstopo.scene.springs_model import (
     CHUNK_BLOCK,
     CHUNK_START,
     CHUNK_STOP,

@@ -3,12 +3,12 @@
 import numpy as np
 
 from mdstopo.case.model import Case
-from mdstopo.mechanics.start_entry import start_tangents
-from mdstopo.scene.compile import Scene
-from mdstopo.scene.grids import places_of
-from mdstopo.scene.model import COUNT, DESIGN, MEMBER, STIFFNESS, FloatArray
-from mdstopo.scene.modes import Modes, modes_of
+from mdstopo.mechanics.start_tangents_entry import start_tangents
+from mdstopo.scene.compile_scene import Scene
+from mdstopo.scene.grid_members import places_of
 from mdstopo.scene.packing import pack
+from mdstopo.scene.springs_model import COUNT, DESIGN, MEMBER, STIFFNESS, FloatArray
+from mdstopo.scene.vibration_modes import Modes, modes_of
 
 
 def start_modes(case: Case, scene: Scene, design: FloatArray) -> Modes:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import member_kernel, vector_entry
 from mdstopo.optimizer import cones
-from mdstopo.optimizer.kernels import add, dot, put
+from mdstopo.optimizer.interior_kernels import add, dot, put
 from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.optimizer.reduced import Curved, Factored, Rows, factor, solve, times
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdstopo.optimizer.approximation import Approximation
-from mdstopo.optimizer.kernels import ELASTIC, EQUAL, LIMIT, OBJECTIVE, interior_loop
+from mdstopo.optimizer.interior_kernels import ELASTIC, EQUAL, LIMIT, OBJECTIVE, interior_loop
 from mdstopo.optimizer.problem import Floats, LinearRows
 
 MAX_STEPS = 80

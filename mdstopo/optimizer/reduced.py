@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.compiler.jit import member_kernel
-from mdstopo.optimizer.kernels import add, dot, put
+from mdstopo.optimizer.interior_kernels import add, dot, put
 from mdstopo.optimizer.problem import Floats, Ints
 
 #: slack over multiplier, in the scaled problem, below which a row is all but active

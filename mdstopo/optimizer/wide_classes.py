@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, member_kernel, vector_entry
 from mdstopo.compiler.threads import shared, taken
-from mdstopo.optimizer.kernels import _dot3, add, dot
+from mdstopo.optimizer.interior_kernels import _dot3, add, dot
 from mdstopo.optimizer.problem import Bools, Floats, Ints
 from mdstopo.optimizer.wide_passes import PIECE, part, pieces
 

@@ -8,13 +8,13 @@
 
 theta (R,) are the rows' multipliers; of a row of the curvature -M^-1 w. Bounds are eliminated variable by variable;
 each step of Mehrotra's predictor and corrector solves one dense system of the size of the rows and the groups. Arrays
-are those of `kernels`; there a variable without bounds has both `AWAY`.
+are those of `interior_kernels`; there a variable without bounds has both `AWAY`.
 """
 
 import numpy as np
 
 from mdstopo.compiler.jit import member_kernel, vector_entry
-from mdstopo.optimizer.kernels import _dot3, add, correct, direct, dot, eliminate, move
+from mdstopo.optimizer.interior_kernels import _dot3, add, correct, direct, dot, eliminate, move
 from mdstopo.optimizer.problem import Floats, Ints
 
 BLOCK = 1024
@@ -41,8 +41,8 @@ def _expand(
       v (n,): the variables.
       bounds (4, n): distances to the bounds and their multipliers.
     Out:
-      work (5, n): D^-1, rho, and minus the bounds' multipliers, as in `kernels`; the row of steps is left alone.
-      S (R, R): Q D^-1 Q'.
+      work (5, n): D^-1, rho, and minus the bounds' multipliers, as in `interior_kernels`; the row of steps is left
+      alone. S (R, R): Q D^-1 Q'.
       rhs (R,): Q D^-1 rho.
       values (R,): Q v.
 
@@ -168,7 +168,7 @@ def interior(
       settings (3,): mean complementarity product and residual to be reached, most steps.
     Out, moved from where they start to the best point:
       v (n,): the variables.
-      bounds (4, n): distances to the bounds and their multipliers, as in `kernels`.
+      bounds (4, n): distances to the bounds and their multipliers, as in `interior_kernels`.
       rows (2, R): slacks and multipliers.
       levels (2, J + 1): the levels e and their multipliers.
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.member_lines import MOST, NARROWEST, widest_of
 from mdstopo.plots.scenery import Floats, start_state
-from mdstopo.plots.shapes import planar_shapes
 from mdstopo.plots.source import Source
 from mdstopo.plots.stage import Stage
 from mdstopo.plots.style import WIDTH, colour, ink, paper
 from mdstopo.plots.thickness import Thickness, families, strongest, thickness
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 from mdstopo.store.store_errors import StoreError
 
 FORMATS = (".gif", ".mp4", ".svg")

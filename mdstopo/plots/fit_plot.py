@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.fit.record import content as content_of
+from mdstopo.fit.fit_record import content as content_of
 from mdstopo.plots.fitted_curves import fitted_curves, profile_curves
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import colour, ink

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mdstopo.plots.objectives_over_time import response_history
 from mdstopo.plots.source import SAMPLES, Floats, Source
-from mdstopo.plots.watch import response_history
 
 #: points of a profile's curves
 FINE = 81
@@ -29,7 +29,7 @@ class ProfileCurves(NamedTuple):
 
 
 def profile_curves(estimate: Mapping[str, Any], profile: Mapping[str, Any]) -> ProfileCurves:
-    """The curves of an estimate's profile. estimate, profile: of `fit.record.content`."""
+    """The curves of an estimate's profile. estimate, profile: of `fit.fit_record.content`."""
     values, t = (np.array([np.nan if x is None else x for x in profile[key]]) for key in ("values", "t"))
     known = np.isfinite(t)
     fine = np.linspace(values[0], values[-1], FINE)
@@ -41,7 +41,7 @@ def profile_curves(estimate: Mapping[str, Any], profile: Mapping[str, Any]) -> P
 def fitted_curves(source: Source, content: Mapping[str, Any]) -> dict[str, tuple[Floats, Floats]]:
     """(time, value) of each series, from its first to its last measurement; none of a case without a fit.
 
-    source: of a result of `mdstopo fit`. content: of `fit.record.content`.
+    source: of a result of `mdstopo fit`. content: of `fit.fit_record.content`.
     """
     found: dict[str, tuple[Floats, Floats]] = {}
     for each in content["series"]:

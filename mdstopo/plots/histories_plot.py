@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.units import unit_of, words
+from mdstopo.case.response_units import unit_of, words
+from mdstopo.plots.objectives_over_time import response_history
 from mdstopo.plots.source import SAMPLES, Floats, Source
 from mdstopo.plots.style import DASHES, colour, new_figure
-from mdstopo.plots.watch import response_history
 from mdstopo.store.store_errors import StoreError
 
 #: letters of a title that a column is wide enough for

@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import GROUND, Case
+from mdstopo.plots.body_shapes import Shape, followed, planar_shapes
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.member_lines import draw_members
 from mdstopo.plots.scenery import edge_at, ends_at, own_points, start_state
-from mdstopo.plots.shapes import Shape, followed, planar_shapes
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.space_layout import draw_space
 from mdstopo.plots.style import MOST_NAMED, WIDTH, colour, ink
 from mdstopo.plots.symbol_marks import draw_glyph, draw_symbols, legend_handles
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.thickness import Thickness, families, thickness
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 
 #: how many times larger than the design a scene may be before its far ends (of contacts, say) are left out of the view
 FAR, MARGIN = 2.0, 0.12

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case, MemberGroup
 from mdstopo.plots.scenery import Floats
-from mdstopo.scene.points import point_rates, points_at
+from mdstopo.scene.point_positions import point_rates, points_at
 
 Chosen = list[tuple[MemberGroup, NDArray[np.int64]]]
 

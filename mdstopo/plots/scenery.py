@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, Contact, MemberGroup
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 from mdstopo.scene.quaternions import quaternions_of
 
 Floats = NDArray[np.float64]

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from mdstopo.case.model import GROUND, Case
+from mdstopo.plots.body_shapes import BORDER, line_shape, others
 from mdstopo.plots.scenery import Floats, hull, own_points, start_state
-from mdstopo.plots.shapes import BORDER, line_shape, others
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 from mdstopo.scene.quaternions import principal
 
 #: of the size of a cloud of points: what is thinner is flat, or a line, or a point

@@ -48,7 +48,7 @@ class Source:
         case = case_of(self.view)
         if self.view.kind != "fit":
             return case
-        from mdstopo.fit.record import fitted_case
+        from mdstopo.fit.fit_record import fitted_case
 
         return fitted_case(self.view, case)
 

@@ -17,7 +17,7 @@ from mdstopo.plots.symbol_marks import draw_symbols, legend_handles
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.thickness import Thickness, families
 from mdstopo.plots.views import View, views
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 
 #: inches: a page's width, its greatest height; left of a panel, below it, above it; a line of the legend, its title
 PAGE, TALL = 2.0 * WIDTH, 9.0

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import GROUND
+from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.layout_plot import draw_bodies, draw_state
 from mdstopo.plots.member_lines import draw_members
 from mdstopo.plots.scenery import Floats, ends_at, own_points
-from mdstopo.plots.shapes import planar_shapes
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.space_layout import draw_frame, draw_scene, scene_cloud
@@ -18,7 +18,7 @@ from mdstopo.plots.symbol_marks import draw_symbols
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.thickness import Thickness
 from mdstopo.plots.views import views
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 
 #: share of the window that is left free
 MARGIN = 0.08

@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.case.model import GROUND, Case, Surface, SurfaceContact
 from mdstopo.plots.scenery import Floats, points_of, start_state
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 
 #: parts of a side of a plane or a rectangle; corners of a circle; circles and lines along a cylinder
 PARTS, CORNERS, CIRCLES, SPOKES = 4, 32, 3, 8

@@ -9,7 +9,7 @@ import numpy as np
 from mdstopo.case.arrays import Table, TimeFormula
 from mdstopo.case.model import GROUND, Case, Load, LoadCase
 from mdstopo.plots.scenery import Floats
-from mdstopo.scene.points import points_at
+from mdstopo.scene.point_positions import points_at
 
 #: of the largest: what is smaller has no arrow
 TINY = 1e-6

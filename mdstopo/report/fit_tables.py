@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.fit.record import content as content_of
+from mdstopo.fit.fit_record import content as content_of
 from mdstopo.fit.sentences import correlated, undetermined
 from mdstopo.plots.fitted_curves import fitted_curves, profile_curves
 from mdstopo.plots.source import Source

@@ -8,8 +8,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from mdstopo._version import __version__
 from mdstopo.case.model import GROUND, Case
+from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.scenery import Floats, ends_at, start_state
-from mdstopo.plots.shapes import planar_shapes
 from mdstopo.plots.solids import Solid, convex, joined, solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import COLOURS

@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case
-from mdstopo.case.units import unit_of, unit_of_value, words
+from mdstopo.case.response_units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared, kept_iterates
+from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.member_forces import Chosen, forces_of
+from mdstopo.plots.objectives_over_time import response_history
 from mdstopo.plots.scenery import points_of, start_state
-from mdstopo.plots.shapes import planar_shapes
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.symbols import LOADS, Symbol, symbols
 from mdstopo.plots.thickness import families, strongest, thickness
 from mdstopo.plots.views import upright
-from mdstopo.plots.watch import response_history
 from mdstopo.report.fit_tables import fit_part
 from mdstopo.report.report_tables import best_iterate, constraint_rows, member_peaks, objective_rows, parts, peak_of
 from mdstopo.store.whole_front import whole_front

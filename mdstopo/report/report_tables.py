@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case, ResponseRow
+from mdstopo.case.response_units import unit_of, unit_of_value, words
 from mdstopo.case.stages import stage_count
-from mdstopo.case.units import unit_of, unit_of_value, words
 from mdstopo.limiting.compare import kept_iterates
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.scenery import Floats

@@ -3,8 +3,8 @@
 import numpy as np
 
 from mdstopo.case.model import Case, SpringLaw
-from mdstopo.scene.model import FloatArray
-from mdstopo.scene.points import member_lengths
+from mdstopo.scene.point_positions import member_lengths
+from mdstopo.scene.springs_model import FloatArray
 
 #: members times states whose energy is computed at once
 AT_ONCE = 4_000_000

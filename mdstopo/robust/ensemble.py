@@ -15,9 +15,9 @@ from mdstopo.design_problem import competes, sign_of
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import USUAL, ErrorEstimate, Evaluation, FloatArray, Peak, Rows
 from mdstopo.integrators.steps import WORK_NAMES
-from mdstopo.robust.points import evaluator_at, name_of, nominal_evaluator
 from mdstopo.robust.robust_measures import rows, slopes
 from mdstopo.robust.sample import Sample, design_sample
+from mdstopo.robust.sampled_case import evaluator_at, name_of, nominal_evaluator
 from mdstopo.status import Status
 
 if TYPE_CHECKING:

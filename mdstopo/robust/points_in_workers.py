@@ -10,8 +10,8 @@ from typing import Any
 from mdstopo.case.model import Case
 from mdstopo.evaluation import FloatArray
 from mdstopo.robust.ensemble import Ensemble, Part
-from mdstopo.robust.points import evaluator_at, nominal_case, nominal_evaluator
 from mdstopo.robust.sample import Sample, design_sample
+from mdstopo.robust.sampled_case import evaluator_at, nominal_case, nominal_evaluator
 from mdstopo.robust.trial import Trial, tried
 from mdstopo.starts.evaluator_interface import even, problem_of
 from mdstopo.starts.getting_ready import get_ready

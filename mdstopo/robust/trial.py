@@ -7,8 +7,8 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.evaluation import FloatArray
-from mdstopo.robust.points import evaluator_at, name_of
 from mdstopo.robust.sample import Sample
+from mdstopo.robust.sampled_case import evaluator_at, name_of
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case, LoadCase
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 
 def axes_of(body: Any) -> FloatArray:

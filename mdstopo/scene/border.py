@@ -11,8 +11,8 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.scene.bodies import is_spatial
-from mdstopo.scene.model import FloatArray
 from mdstopo.scene.quaternions import principal, product, quaternions_of, rotations_of
+from mdstopo.scene.springs_model import FloatArray
 
 
 class Border(Protocol):

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from mdstopo.case.model import GROUND, Case, MemberGroup
-from mdstopo.scene.compile import Scene
-from mdstopo.scene.grids import places_of
-from mdstopo.scene.model import COUNT, DESIGN, L0, PAIR, PRELOAD, PX, PY, QX, QY, STIFFNESS, FloatArray
+from mdstopo.scene.compile_scene import Scene
+from mdstopo.scene.grid_members import places_of
+from mdstopo.scene.springs_model import COUNT, DESIGN, L0, PAIR, PRELOAD, PX, PY, QX, QY, STIFFNESS, FloatArray
 from mdstopo.status import Status
 
 #: a member this much shorter than at the start, when the step collapses, is what stopped the motion

@@ -3,7 +3,7 @@
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
 from mdstopo.case.responses import kind_of
-from mdstopo.scene.signals import formulas_of
+from mdstopo.scene.signal_segments import formulas_of
 
 #: reductions of stored energy that the first family computes
 _REDUCTIONS = frozenset({"max", "min", "mean", "integral", "final"})

@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.case.model import GROUND, Load, LoadCase
-from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.signals import segment_values
+from mdstopo.scene.signal_segments import segment_values
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 
 class Loads(NamedTuple):
-    """The fields of a model that hold loads, with their meaning there (`scene.model.Model`)."""
+    """The fields of a model that hold loads, with their meaning there (`scene.springs_model.Model`)."""
 
     force: FloatArray
     load_body: IndexArray

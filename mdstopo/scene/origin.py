@@ -36,7 +36,7 @@ from mdstopo.case.model import (
     Table,
 )
 from mdstopo.scene.bodies import distances, placed
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 #: the grid of origins is at least so many times as wide as half the scene
 WIDER = 4.0

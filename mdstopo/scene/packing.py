@@ -12,7 +12,7 @@ import numpy as np
 from mdstopo.compiler.fields import Fields, views_of
 from mdstopo.compiler.jit import part
 from mdstopo.compiler.threads import allowed
-from mdstopo.scene.model import CHUNK, MANY, ROWS, START, STOP, WIDTH, FloatArray, IndexArray, Model
+from mdstopo.scene.springs_model import CHUNK, MANY, ROWS, START, STOP, WIDTH, FloatArray, IndexArray, Model
 
 #: the fields of a model, of which the first integers are the sizes
 FIELDS = Fields(Model)

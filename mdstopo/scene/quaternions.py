@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 #: components of a unit quaternion up to this size are rounding's: they do not choose its sign
 NOUGHT = 1e-14

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from mdstopo.case.model import Case, MemberGroup
-from mdstopo.scene.model import FloatArray
 from mdstopo.scene.origin import Point, seen_from
+from mdstopo.scene.springs_model import FloatArray
 
 #: the other point is so far away, of the scene's size: coordinates stay as large as they are
 APART = 0.05, 0.2

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 
 @dataclass(frozen=True)

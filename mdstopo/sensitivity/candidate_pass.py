@@ -1,7 +1,7 @@
 """A pass over the candidates of a group, with any function that prices them: totals, and the best candidates.
 
 Prices are computed by compiled entries that keep a few numbers of each tile of TALL by BROAD points, and those of
-single candidates (`sensitivity.pricing`, `general.pricing`).
+single candidates (`sensitivity.springs_pricing`, `general.general_pricing`).
 """
 
 from abc import ABC, abstractmethod
@@ -12,8 +12,8 @@ import numpy as np
 
 from mdstopo.case.candidates import lengths_between, spread
 from mdstopo.case.model import MemberGroup
-from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.sensitivity.candidate_prices import (
+from mdstopo.scene.springs_model import FloatArray, IndexArray
+from mdstopo.sensitivity.springs_candidate_prices import (
     ABOVE,
     BELOW,
     BEST,

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from mdstopo.compiler.jit import entry, part
-from mdstopo.integrators.gauss import TAG as GAUSS
+from mdstopo.integrators.springs_gauss import TAG as GAUSS
 from mdstopo.integrators.steps import ENERGY, FIRST, FORCES, SEGMENT, SPRINGS, TIME, Q, V, carve, solved_to, step_at
 from mdstopo.integrators.steps_interface import point_of, steps_of
 from mdstopo.mechanics.active_members import active_members
@@ -19,7 +19,8 @@ from mdstopo.mechanics.kinematics.planar_scales import deflection
 from mdstopo.mechanics.laws.spring import elongation_of, meeting_in, passing_in, shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUM_T, SUM_X, SUM_Y, SUMS, member_sums, springs_of, unscale_gradient
-from mdstopo.scene.model import (
+from mdstopo.scene.packing import unpack
+from mdstopo.scene.springs_model import (
     DESIGN,
     EXCESS,
     L0,
@@ -34,8 +35,7 @@ from mdstopo.scene.model import (
     STOP,
     WIDTH,
 )
-from mdstopo.scene.packing import unpack
-from mdstopo.sensitivity.adjoint import energy_rows
+from mdstopo.sensitivity.springs_adjoint import energy_rows
 
 #: change of the speed with which the ends of a member pass, in tolerances, that may not be left out
 UNSEEN = 100.0

@@ -1,4 +1,4 @@
-"""Sensitivities of all members carried through one linear map: what `direct` does a step.
+"""Sensitivities of all members carried through one linear map: what `springs_direct` does a step.
 
 A step is a linear map of the changes of its start (D numbers: q, v and what the method carries) and of the force that
 each member adds at its stages. The map is found at body level by pushing unit changes through the integrator's
@@ -16,7 +16,22 @@ from mdstopo.integrators.steps import FIRST
 from mdstopo.integrators.steps_interface import carried, tangent_step
 from mdstopo.mechanics.kinematics.planar_poses import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
-from mdstopo.scene.model import DAMPING, DESIGN, EXCESS, KIND, L0, PAIR, PRELOAD, PX, PY, QX, QY, START, STIFFNESS, STOP
+from mdstopo.scene.springs_model import (
+    DAMPING,
+    DESIGN,
+    EXCESS,
+    KIND,
+    L0,
+    PAIR,
+    PRELOAD,
+    PX,
+    PY,
+    QX,
+    QY,
+    START,
+    STIFFNESS,
+    STOP,
+)
 
 #: members that are carried through together: their rows stay in the first-level cache
 STRIP = 128

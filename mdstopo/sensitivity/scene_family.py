@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mdstopo.case.model import Case, MemberGroup
 from mdstopo.integrators.scene_driver import DriverOptions, Scene, SceneDriver
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.springs_model import FloatArray
 
 if TYPE_CHECKING:
     from mdstopo.sensitivity.candidate_pass import CandidatePass

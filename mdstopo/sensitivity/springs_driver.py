@@ -9,17 +9,17 @@ import numpy as np
 from mdstopo.case.model import Case, MemberGroup
 from mdstopo.integrators.driver import Driver
 from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult
-from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
+from mdstopo.scene.compile_scene import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.diagnosis import Diagnosis
-from mdstopo.scene.model import FloatArray
-from mdstopo.scene.modes import Modes
 from mdstopo.scene.settled import Settled
+from mdstopo.scene.springs_model import FloatArray
+from mdstopo.scene.vibration_modes import Modes
 from mdstopo.sensitivity.reductions import INTEGRALS, REDUCTIONS
 from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
-    from mdstopo.sensitivity.pricing import SpringCandidates, SpringPricingStates
+    from mdstopo.sensitivity.springs_pricing import SpringCandidates, SpringPricingStates
 
 
 class SpringsDriver(Driver):
@@ -34,13 +34,13 @@ class SpringsDriver(Driver):
 
     def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
         """Gradients of what `evaluate` found; energies are no norms, so `cones` changes nothing."""
-        from mdstopo.sensitivity.methods import differentiate
+        from mdstopo.sensitivity.springs_methods import differentiate
 
         return differentiate(method, self, alpha, looked)
 
     def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and the derivative (T, N) of the stored energy at them, by `direct`."""
-        from mdstopo.sensitivity.methods import histories
+        from mdstopo.sensitivity.springs_methods import histories
 
         return histories(self, alpha)
 
@@ -73,7 +73,7 @@ class SpringsDriver(Driver):
 
     def pricing_states(self, factor: FloatArray) -> "SpringPricingStates":
         """The states from which prices follow, of the rows of the last evaluation times factor (n_obj, R)."""
-        from mdstopo.sensitivity.pricing import pricing_states_of
+        from mdstopo.sensitivity.springs_pricing import pricing_states_of
 
         return pricing_states_of(self, factor)
 
@@ -105,7 +105,7 @@ def _candidates(
     scenes: Mapping[str, Scene], place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None
 ) -> "SpringCandidates":
     """The candidates of a priced group; all load cases have the same."""
-    from mdstopo.sensitivity.pricing import SpringCandidates
+    from mdstopo.sensitivity.springs_pricing import SpringCandidates
 
     return SpringCandidates(group, next(iter(scenes.values())).model.block[place], homes, count)
 

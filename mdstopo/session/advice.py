@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import GROUND, Case, FloatArray, Objective, ResponseRow, VolumeRow
 from mdstopo.case.responses import kind_of
 from mdstopo.scene.moving_volumes import spent
-from mdstopo.scene.points import seats_at
+from mdstopo.scene.point_positions import seats_at
 from mdstopo.starts.evaluator_interface import Evaluation
 from mdstopo.store.contents import Motion
 

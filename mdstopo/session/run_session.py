@@ -25,7 +25,7 @@ from mdstopo.session.coarse_steps import coarse_steps
 from mdstopo.session.combining import Combining
 from mdstopo.session.compiling_apart import compile_apart
 from mdstopo.session.outcome import Outcome, Progress
-from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
+from mdstopo.session.saved_states import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
 from mdstopo.session.sizes import Sizes, excess_at_prices
 from mdstopo.session.start_in_stages import (

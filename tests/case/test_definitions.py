@@ -15,8 +15,8 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.cli.group import run_group
 from mdstopo.finalize.document import content_of
-from mdstopo.robust.points import case_at
 from mdstopo.robust.sample import design_sample
+from mdstopo.robust.sampled_case import case_at
 from mdstopo.store.same_case import describe, differences
 from mdstopo.store.store_errors import StoreError
 

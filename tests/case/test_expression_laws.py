@@ -13,8 +13,8 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
 from mdstopo.finalize.scaled_laws import sized
-from mdstopo.robust.points import case_at
 from mdstopo.robust.sample import design_sample
+from mdstopo.robust.sampled_case import case_at
 from mdstopo.store.same_case import describe, differences
 
 from .scenes import SMALL, mistakes

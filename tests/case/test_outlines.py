@@ -17,7 +17,7 @@ from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.svg_path import PathError, areas
 from mdstopo.finalize.document import content_of
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 
 from .scenes import SMALL, SPACE, changed, mistakes
 

@@ -144,7 +144,7 @@ def test_numbers_and_powers_without_end_are_refused_at_once(text: str) -> None:
 
 def test_what_is_written_from_a_case_has_its_numbers_in_si() -> None:
     from mdstopo.finalize.document import content_of
-    from mdstopo.finalize.lift import lifted
+    from mdstopo.finalize.lift_case import lifted
 
     text = CASE.format(**UNITS).replace('angle: "250 mrad"', "angle: 0")
     case = read_case(text)

@@ -14,9 +14,9 @@ from mdstopo.case.arrays import Signal, Table, TimeFormula
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case, read_case
-from mdstopo.case.rotations import about_axis
+from mdstopo.case.start_rotations import about_axis
 from mdstopo.cli.group import run_group
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 
 CASES = Path(__file__).parents[2] / "cases"
 PLANAR = """\

@@ -14,13 +14,13 @@ from mdstopo.case.reader import load_case as read
 from mdstopo.cli.check_scene import odd_scales
 from mdstopo.cli.group import run_group
 from mdstopo.cli.new import templates
+from mdstopo.plots.body_shapes import planar_shapes
+from mdstopo.plots.objectives_over_time import response_history
 from mdstopo.plots.plot_table import PLOTS, fitting
 from mdstopo.plots.scenery import edge_at, hull, sizes, start_state
-from mdstopo.plots.shapes import planar_shapes
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import styled
 from mdstopo.plots.thickness import FAINT, stored_peaks
-from mdstopo.plots.watch import response_history
 from mdstopo.report.report_content import content
 from mdstopo.scene.refusals import refusals
 from tests.front.support import CASE

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mdstopo.compiler import store
-from mdstopo.compiler.choice import Listed, chosen
+from mdstopo.compiler.choice_by_code import Listed, chosen
 from mdstopo.compiler.jit import entry, inline
 
 

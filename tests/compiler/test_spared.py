@@ -143,7 +143,7 @@ def in_strict(x, y):
 
 @pytest.mark.parametrize("split", ["", __name__], ids=["in one piece", "apart"])
 def test_long_loops_are_optimised_once(split: str, monkeypatch) -> None:
-    from mdstopo.compiler import units
+    from mdstopo.compiler import compiled_units as units
     from mdstopo.compiler.call import Native
     from mdstopo.compiler.kernel import compile_anew, way
 

@@ -69,7 +69,7 @@ import math
 
 from mdstopo.compiler.jit import inline, kernel
 from mdstopo.general.response_kernels import ResponseKernels
-from mdstopo.mechanics.laws.kernels import LawKernels
+from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 
 @inline

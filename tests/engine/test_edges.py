@@ -5,7 +5,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
-from mdstopo.scene.signals import breakpoints
+from mdstopo.scene.signal_segments import breakpoints
 from mdstopo.status import Status
 
 SCENE = """

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from mdstopo import simulate
 from mdstopo.engine import Evaluator
-from mdstopo.mechanics.start_entry import start_tangents
-from mdstopo.scene.compile import compile_members, compile_scene, state_order
-from mdstopo.scene.grids import places_of
-from mdstopo.scene.model import COUNT, DESIGN, STIFFNESS
+from mdstopo.mechanics.start_tangents_entry import start_tangents
+from mdstopo.scene.compile_scene import compile_members, compile_scene, state_order
+from mdstopo.scene.grid_members import places_of
 from mdstopo.scene.packing import pack
+from mdstopo.scene.springs_model import COUNT, DESIGN, STIFFNESS
 from tests.engine.plain import Plain
 from tests.engine.scenes import FEATURES, random_design, random_scene, read
 

@@ -8,8 +8,8 @@ from mdstopo.compiler.threads import VARIABLE
 from mdstopo.engine import Evaluator
 from mdstopo.mechanics import passes
 from mdstopo.mechanics.kinematics.planar_poses import POSE
-from mdstopo.scene.model import CHUNK, MANY
 from mdstopo.scene.packing import FIELDS, pack, unpack
+from mdstopo.scene.springs_model import CHUNK, MANY
 from tests.compiled import compiled
 from tests.engine.scenes import read
 

@@ -5,7 +5,7 @@ import pytest
 
 import mdstopo.case.reader
 import mdstopo.integrators.driver
-import mdstopo.scene.compile
+import mdstopo.scene.compile_scene
 import mdstopo.sensitivity.springs_driver
 from mdstopo import evaluate, simulate
 from mdstopo.engine import Evaluator
@@ -56,7 +56,7 @@ def test_the_second_evaluation_reads_and_compiles_nothing(monkeypatch):
         raise AssertionError("compiled or read again")
 
     for module, name in (
-        (mdstopo.case.reader, "parse"), (mdstopo.scene.compile, "compile_scene"),
+        (mdstopo.case.reader, "parse"), (mdstopo.scene.compile_scene, "compile_scene"),
         (mdstopo.sensitivity.springs_driver, "compile_scene"), (mdstopo.sensitivity.springs_driver, "compile_members"),
         (mdstopo.sensitivity.springs_driver, "SpringsDriver"), (mdstopo.integrators.driver.Driver, "__init__"),
     ):  # fmt: skip

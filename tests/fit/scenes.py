@@ -12,7 +12,7 @@ from mdstopo.case.arrays import FloatArray
 from mdstopo.case.measurements import Measured
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
-from mdstopo.fit.problem import FitProblem
+from mdstopo.fit.fit_problem import FitProblem
 
 #: a block on a spring, which it meets, leaves and meets again
 DROP = """

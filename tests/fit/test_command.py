@@ -12,7 +12,7 @@ import pytest
 from mdstopo.case.reader import load_case
 from mdstopo.cli.group import run_group
 from mdstopo.fit import run_fit as module
-from mdstopo.fit.record import content
+from mdstopo.fit.fit_record import content
 from mdstopo.store.output_file import output_file
 from mdstopo.store.result_reader import read_result
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mdstopo.fit.problem import FitProblem
+from mdstopo.fit.fit_problem import FitProblem
 
 from .scenes import problem_of
 

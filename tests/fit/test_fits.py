@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from mdstopo.fit.fit_problem import FitProblem
+from mdstopo.fit.least_squares import StoppedError, fitted, minimum, starts
 from mdstopo.fit.predictions import Predicted
-from mdstopo.fit.problem import FitProblem
-from mdstopo.fit.profile import profile
+from mdstopo.fit.profile_likelihood import profile
 from mdstopo.fit.run_fit import run_fit
-from mdstopo.fit.solve import StoppedError, fitted, minimum, starts
 from mdstopo.fit.statistics import statistics
 
 from .scenes import DROP, PAIR, measured, problem_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mdstopo.fit.problem import FitProblem
-from mdstopo.fit.solve import fitted
+from mdstopo.fit.fit_problem import FitProblem
+from mdstopo.fit.least_squares import fitted
 from mdstopo.fit.statistics import statistics
 
 from .scenes import measured, problem_of

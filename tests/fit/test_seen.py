@@ -13,8 +13,8 @@ import pytest
 from mdstopo.case.reader import load_case
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
-from mdstopo.fit.problem import FitProblem
-from mdstopo.fit.record import FitFile, content
+from mdstopo.fit.fit_problem import FitProblem
+from mdstopo.fit.fit_record import FitFile, content
 from mdstopo.fit.run_fit import FitRun, run_fit
 from mdstopo.plots.fit_plot import folded
 from mdstopo.plots.plot_table import fitting

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from mdstopo.case.measurements import Measured
-from mdstopo.fit.solve import Minimum, loss
+from mdstopo.fit.least_squares import Minimum, loss
 from mdstopo.fit.statistics import statistics
 
 

@@ -9,9 +9,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mdstopo.formula.calculus import derivative, simplified, substituted
+from mdstopo.formula.formula_values import value_of
 from mdstopo.formula.parser import parse
 from mdstopo.formula.tree import name, number, parts, text_of
-from mdstopo.formula.values import value_of
 
 from .random_formulas import evaluate, formulas
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mdstopo.formula.errors import FormulaError
+from mdstopo.formula.formula_error import FormulaError
+from mdstopo.formula.formula_values import finite_value, value_of
 from mdstopo.formula.parser import DEEPEST, LONGEST, MOST, parse
 from mdstopo.formula.tree import FUNCTIONS, name, number, operation, parts, text_of
-from mdstopo.formula.values import finite_value, value_of
 
 from .random_formulas import evaluate, formulas
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mdstopo.formula.formula_values import value_of
 from mdstopo.formula.idle import Idle
 from mdstopo.formula.law_formulas import FORCE, Program, program
-from mdstopo.formula.modes import TooManySwitchesError
-from mdstopo.formula.values import value_of
+from mdstopo.formula.smooth_modes import TooManySwitchesError
 from tests.formula.random_formulas import formulas
 
 

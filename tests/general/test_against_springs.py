@@ -8,9 +8,9 @@ import pytest
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.general.compile import compile_general
+from mdstopo.general.compile_general import compile_general
 from mdstopo.general.general_driver import GeneralDriver
-from mdstopo.integrators.choice import method_of
+from mdstopo.integrators.integrator_choice import method_of
 from mdstopo.integrators.scene_driver import DriverOptions
 
 CASE = """

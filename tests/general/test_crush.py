@@ -9,7 +9,8 @@ import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import CrushLaw
 from mdstopo.case.reader import read_case
-from mdstopo.mechanics.laws import crush, table
+from mdstopo.mechanics.laws import crush
+from mdstopo.mechanics.laws import law_table as table
 from mdstopo.status import Status
 from tests.compiled import compiled
 from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text, slopes

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mdstopo.case.laws.expression import with_parameters
+from mdstopo.case.laws.expression_law import with_parameters
 from mdstopo.case.model import ActuatorLaw, CubicLaw, GapLaw, Law, PulseLaw, SpringLaw
-from mdstopo.mechanics.laws import table
+from mdstopo.mechanics.laws import law_table as table
 from tests.formula.random_formulas import evaluate
 from tests.space.in_python import in_python  # noqa: F401
 

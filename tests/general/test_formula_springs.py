@@ -7,12 +7,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from mdstopo.case.laws.cubic import CubicLaw
-from mdstopo.case.laws.spring import SpringLaw
+from mdstopo.case.laws.cubic_law import CubicLaw
+from mdstopo.case.laws.spring_law import SpringLaw
 from mdstopo.case.reader import read_case
 from mdstopo.formula.parser import parse
 from mdstopo.general.formula_springs import polynomial, spring_of, with_springs
-from mdstopo.mechanics.laws import table
+from mdstopo.mechanics.laws import law_table as table
 from tests.formula.random_formulas import evaluate
 
 from .test_expression_kernels import law_of

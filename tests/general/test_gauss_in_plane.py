@@ -15,7 +15,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluators import evaluator_of
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 from tests.robust.scenes import read, uncertain
 
 from .support import design_of, load, slopes

@@ -5,9 +5,9 @@ import pytest
 
 from mdstopo.case.reader import read_case
 from mdstopo.general.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace, solve_unknowns
-from mdstopo.general.compile import compile_general
+from mdstopo.general.compile_general import compile_general
+from mdstopo.general.general_model import pack_general, unpack_general
 from mdstopo.general.joint_matrix import decompose, substitute, weakest
-from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.general.switches import OF_JOINTS, TURNING
 from mdstopo.mechanics.kinematics.planar import turn_bodies
 from tests.compiled import compiled

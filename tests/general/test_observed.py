@@ -1,6 +1,6 @@
 """What `general.observed` names of a scene is there."""
 
-from mdstopo.general.model import GeneralModel
+from mdstopo.general.general_model import GeneralModel
 from mdstopo.general.observed import BALANCE
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mdstopo.general.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace
-from mdstopo.general.model import pack_general, unpack_general
+from mdstopo.general.general_model import pack_general, unpack_general
 from mdstopo.general.projection import swept
 from mdstopo.mechanics.kinematics.planar import turn_bodies
 from tests.compiled import compiled

@@ -10,8 +10,8 @@ from mdstopo.integrators.driver import CLOSENESS, NEWTON_TOLERANCE, ROWS
 from mdstopo.integrators.gauss_tables import gauss_tables
 from mdstopo.integrators.runge_kutta_tables import runge_kutta_tables
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, WORK, carve, room_for
-from mdstopo.scene.model import MEMBER, STIFFNESS, VECTOR, Model
 from mdstopo.scene.packing import pack
+from mdstopo.scene.springs_model import MEMBER, STIFFNESS, VECTOR, Model
 from mdstopo.sensitivity.energy_responses import dense, evaluate_responses
 from mdstopo.sensitivity.reductions import MAX
 
@@ -144,7 +144,7 @@ class Bench:
 
     def __init__(self, scene: Scene, method="generalized_alpha", radius=0.8, reductions=(MAX,)) -> None:
         self.scene, self.method = scene, method
-        self.entry = import_module(f"mdstopo.integrators.{method}_entry")
+        self.entry = import_module(f"mdstopo.integrators.springs_{method}_entry")
         self.tables: Any = {
             "generalized_alpha": lambda: np.array([radius]),
             "gauss": gauss_tables,
@@ -200,7 +200,7 @@ class Bench:
 
     def direct(self, history=False):
         """Gradients (n_obj, R, N) by `direct`; with history also dg/dalpha at the steps' ends (count + 1, N)."""
-        from mdstopo.sensitivity.direct import direct
+        from mdstopo.sensitivity.springs_direct import direct
 
         out = np.zeros_like(self.gradients)
         lines = np.zeros((self.count + 1 if history else 0, self.scene.n_design))
@@ -212,7 +212,7 @@ class Bench:
 
     def iterative(self):
         """Gradients by `iterative`, and the step at which it gave up, or -1."""
-        from mdstopo.sensitivity.iterative import iterative
+        from mdstopo.sensitivity.springs_iterative import iterative
 
         out = np.zeros_like(self.gradients)
         step = iterative(

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mdstopo.compiler.kernel import Kernel
-from mdstopo.mechanics.joints.table import LISTED
+from mdstopo.mechanics.joints.joint_table import LISTED
 from mdstopo.mechanics.kinematics import kinematics_interface
 from mdstopo.mechanics.kinematics.planar import PLANAR
 
@@ -32,18 +32,18 @@ NO_STRIDES = {
     ("accelerations.py", "3 * model.size[1] + 1"): "a banded matrix with room for its pivots",
     ("candidate_prices.py", "range(3)"): "names of columns",
     ("candidate_prices.py", "range(6)"): "names of columns",
-    ("compile.py", "reshape(-1, 6)"): "columns of a response",
+    ("compile_general.py", "reshape(-1, 6)"): "columns of a response",
     ("general_driver.py", "np.zeros((1, 3))"): "a response, its rate and its member",
     ("general_driver.py", "reshape(events, 6)"): "columns of an event",
     ("extremes.py", "reshape(count, SAMPLES, 3)"): "a response, its rate and its member",
     ("generalized_alpha_step.py", "range(3)"): "names of columns",
     ("layout.py", "reshape(-1, 3)"): "columns of a product",
     ("members.py", "range(3)"): "names of columns",
-    ("model.py", "range(6)"): "names of columns",
+    ("general_model.py", "range(6)"): "names of columns",
     ("peak_search.py", "range(3)"): "names of columns",
     ("peak_search.py", "np.empty(3)"): "a response, its rate and its member",
     ("peak_search.py", "np.empty((count, SAMPLES, 3))"): "a response, its rate and its member",
-    ("responses.py", "range(3)"): "coordinates, velocities, accelerations; terms of a difference",
+    ("general_responses.py", "range(3)"): "coordinates, velocities, accelerations; terms of a difference",
     ("settle.py", "range(3)"): "how often it lands",
     ("step_history.py", "range(3)"): "names of columns",
     ("step_history.py", "range(6)"): "names of columns",
@@ -54,7 +54,7 @@ OF_ONE_DIMENSION = {"planar_scene.py", "spatial_scene.py", "turning_drives.py"}
 #: modules that take something of the plane itself, and what
 OF_THE_PLANE = {
     "generalized_alpha.py": {"planar_poses"},  # copy_rows, which copies any rows
-    "model.py": {"planar"},  # says how the bodies of this model move
+    "general_model.py": {"planar"},  # says how the bodies of this model move
     "planar_scene.py": {"planar"},  # what is planar when a case is compiled
     "row_design.py": {"planar_poses"},
     "step_linear.py": {"planar_poses"},

@@ -5,8 +5,8 @@ import pytest
 
 import mdstopo.sensitivity.springs_driver
 from mdstopo.engine import Evaluator
-from mdstopo.scene import compile as scenes
-from mdstopo.scene.grids import STRIDE, row_of
+from mdstopo.scene import compile_scene as scenes
+from mdstopo.scene.grid_members import STRIDE, row_of
 from mdstopo.scene.packing import chunks_of
 from mdstopo.status import Status
 from tests.engine.scenes import INTERIOR, paper, read, with_solver

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from mdstopo.case.model import JOINTS, DistanceJoint, FixedJoint, PrismaticJoint, RevoluteJoint
 from mdstopo.compiler.jit import kernel
-from mdstopo.mechanics.joints import table
+from mdstopo.mechanics.joints import joint_table as table
+from mdstopo.mechanics.joints.joint_table import CODES, WIDTH, describe, kernels_of, parameters
 from mdstopo.mechanics.joints.revolute import PLACES, place_joint
-from mdstopo.mechanics.joints.table import CODES, WIDTH, describe, kernels_of, parameters
-from mdstopo.scene.model import HOME
+from mdstopo.scene.springs_model import HOME
 from tests.compiled import compiled
 
 #: how many rows each has

@@ -31,10 +31,11 @@ from mdstopo.case.model import (
     SpringLaw,
     TableLaw,
 )
-from mdstopo.mechanics.laws import actuator, gap, table
-from mdstopo.mechanics.laws.table import CODES, PARAMETERS, parameters
-from mdstopo.mechanics.laws.table import breakpoints as law_breakpoints
-from mdstopo.scene.signals import breakpoints
+from mdstopo.mechanics.laws import actuator, gap
+from mdstopo.mechanics.laws import law_table as table
+from mdstopo.mechanics.laws.law_table import CODES, PARAMETERS, parameters
+from mdstopo.mechanics.laws.law_table import breakpoints as law_breakpoints
+from mdstopo.scene.signal_segments import breakpoints
 from tests.compiled import compiled
 
 ROOT = Path(__file__).resolve().parents[2]

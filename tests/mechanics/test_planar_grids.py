@@ -11,7 +11,7 @@ import pytest
 from mdstopo.mechanics.kinematics import planar_grids
 from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
-from mdstopo.mechanics.laws.table import SPRING
+from mdstopo.mechanics.laws.law_table import SPRING
 from mdstopo.mechanics.passes import SUMS
 from tests.space.in_python import in_python, same
 

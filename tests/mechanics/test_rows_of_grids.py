@@ -10,9 +10,9 @@ from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.laws.spring import shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, _scale_chunks, _unscale_chunks, member_sums
-from mdstopo.scene.grids import places_of
-from mdstopo.scene.model import EXCESS, L0, START, STIFFNESS, STOP, WIDTH, Springs
+from mdstopo.scene.grid_members import places_of
 from mdstopo.scene.packing import chunks_of
+from mdstopo.scene.springs_model import EXCESS, L0, START, STIFFNESS, STOP, WIDTH, Springs
 from tests.compiled import compiled
 from tests.engine.scenes import read
 from tests.mechanics.test_grids import grids

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdstopo.case.reader import read_case
+from mdstopo.plots.body_shapes import Shape, followed, planar_shapes
 from mdstopo.plots.scenery import start_state
-from mdstopo.plots.shapes import Shape, followed, planar_shapes
 from mdstopo.plots.solids import solid
 from mdstopo.plots.symbols import placed, symbols
 from mdstopo.plots.triangles import triangles

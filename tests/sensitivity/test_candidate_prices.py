@@ -8,7 +8,7 @@ import pytest
 from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.sensitivity.candidate_prices import BROAD, TALL
+from mdstopo.sensitivity.springs_candidate_prices import BROAD, TALL
 
 #: relative to the largest
 AGREE = 1e-10

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mdstopo.scene.packing import pack
-from mdstopo.sensitivity.constant_load import constant_load
+from mdstopo.sensitivity.springs_constant_load import constant_load
 from tests.integrators.scenes import Group, energies, random_scene
 
 

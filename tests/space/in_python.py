@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mdstopo.compiler.choice import Choice
+from mdstopo.compiler.choice_by_code import Choice
 from mdstopo.compiler.kernel import Kernel
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.mechanics.kinematics.spatial_bushings import WIDTH as BUSHING

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 from mdstopo.status import Status
 from tests.general.support import slopes
 

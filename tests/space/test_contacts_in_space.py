@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 from tests.general.support import check_direct, design_of, slopes
 from tests.general.test_contact import HIT
 

@@ -14,7 +14,7 @@ import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 from tests.general.support import slopes
 
 from .support import attitudes, load

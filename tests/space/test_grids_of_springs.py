@@ -10,10 +10,10 @@ import pytest
 
 from mdstopo import Evaluation, evaluate
 from mdstopo.case.reader import read_case
-from mdstopo.general import compile as general_compile
+from mdstopo.general import compile_general as general_compile
 from mdstopo.mechanics.kinematics import spatial_grids
 from mdstopo.mechanics.kinematics.spatial_poses import POSE
-from mdstopo.mechanics.laws.table import SPRING
+from mdstopo.mechanics.laws.law_table import SPRING
 
 from .in_python import KERNELS, in_python, same, scene, state
 

@@ -20,7 +20,7 @@ from mdstopo.plots.views import upright, views
 from mdstopo.report import report_content
 from mdstopo.report.gltf_motion import motion_file
 from mdstopo.report.report_page import page
-from mdstopo.scene.points import point_rates, points_at
+from mdstopo.scene.point_positions import point_rates, points_at
 from mdstopo.scene.quaternions import quaternions_of
 from tests.browser import BROWSER, look
 from tests.front.support import CASE as PLANAR

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.general.compile import GeneralScene, compile_general
-from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH
+from mdstopo.general.compile_general import GeneralScene, compile_general
+from mdstopo.general.general_model import MEMBER_EXCESS, MEMBER_FREE_LENGTH
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.scene.origin import origin_of, seen_from
 

@@ -11,7 +11,7 @@ import pytest
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.mechanics.kinematics.spatial_joints import ROWS, ROWS_OF
 from mdstopo.mechanics.kinematics.spatial_poses import POSE, S, W
-from mdstopo.mechanics.laws.table import SPRING
+from mdstopo.mechanics.laws.law_table import SPRING
 
 from .in_python import BODIES, KERNELS, N, by_numbers, by_q, in_python, same, scene, state
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mdstopo.mechanics.kinematics.spatial_poses import D_RATE, D_SINCE, POSE, D, S
-from mdstopo.mechanics.laws.table import SPRING
+from mdstopo.mechanics.laws.law_table import SPRING
 
 from .in_python import BODIES, KERNELS, N, by_numbers, by_q, in_python, same, scene, state
 

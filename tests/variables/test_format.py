@@ -6,7 +6,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.laws import LAWS
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.reader import read_case
-from mdstopo.mechanics.laws.table import COMMON, kernels_of, place_of
+from mdstopo.mechanics.laws.law_table import COMMON, kernels_of, place_of
 
 SCENE = """
 format: 1

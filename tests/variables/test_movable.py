@@ -10,9 +10,9 @@ import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.movable import placed
 from mdstopo.case.reader import read_case
-from mdstopo.case.rotations import about_axis
+from mdstopo.case.start_rotations import about_axis
 from mdstopo.finalize.finalize_design import finalize, opened, ready
-from mdstopo.finalize.lift import lifted
+from mdstopo.finalize.lift_case import lifted
 from mdstopo.plots.source import Source
 from mdstopo.scene.bodies import stands_as
 from mdstopo.scene.moving_volumes import spent

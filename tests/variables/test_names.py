@@ -15,8 +15,8 @@ from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.finalize_design import finalize, opened, ready
 from mdstopo.robust.ensemble import Ensemble
-from mdstopo.robust.points import case_at
 from mdstopo.robust.sample import design_sample
+from mdstopo.robust.sampled_case import case_at
 from mdstopo.scene.design_map import as_designed
 from mdstopo.session.run_session import run_session
 from mdstopo.store.result_reader import read_result

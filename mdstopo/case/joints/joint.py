@@ -38,9 +38,9 @@ class Joint(Value):
     """What all joints have in common.
 
     type: the word of the YAML key ``type``; doc: a sentence for the case reference; keys: beside type, name and bodies.
-    kernels: the module with the joint's `KERNELS` (`mechanics.joints.kernels`). keeps_angle: whether the bodies do not
-    turn against each other; keeps_point: whether its points stay together. is_link: whether they lie apart, as the ends
-    of a link do.
+    kernels: the module with the joint's `KERNELS` (`mechanics.joints.joint_kernels`). keeps_angle: whether the bodies
+    do not turn against each other; keeps_point: whether its points stay together. is_link: whether they lie apart, as
+    the ends of a link do.
     index: its place in the file, from 0; name: as stated, else the index as text.
     bodies: first and second; at_first, at_second: the joint's point on each, in body coordinates.
     """

@@ -5,17 +5,17 @@ What a law does stands in `mdstopo.mechanics.laws`, in the module that its recor
 
 from typing import Any
 
-from mdstopo.case.laws.actuator import ActuatorLaw
-from mdstopo.case.laws.crush import CrushLaw
-from mdstopo.case.laws.cubic import CubicLaw
-from mdstopo.case.laws.curve import CurveLaw
-from mdstopo.case.laws.expression import ExpressionLaw
-from mdstopo.case.laws.gap import GapLaw
-from mdstopo.case.laws.inerter import InerterLaw
+from mdstopo.case.laws.actuator_law import ActuatorLaw
+from mdstopo.case.laws.crush_law import CrushLaw
+from mdstopo.case.laws.cubic_law import CubicLaw
+from mdstopo.case.laws.curve_law import CurveLaw
+from mdstopo.case.laws.expression_law import ExpressionLaw
+from mdstopo.case.laws.gap_law import GapLaw
+from mdstopo.case.laws.inerter_law import InerterLaw
 from mdstopo.case.laws.law import Law, record_of
-from mdstopo.case.laws.pulse import PulseLaw
-from mdstopo.case.laws.spring import SpringLaw
-from mdstopo.case.laws.table import TableLaw
+from mdstopo.case.laws.pulse_law import PulseLaw
+from mdstopo.case.laws.spring_law import SpringLaw
+from mdstopo.case.laws.table_law import TableLaw
 from mdstopo.case.records import Record
 
 #: the laws by their word; their codes in kernels follow this order

@@ -28,7 +28,7 @@ class Law(Value):
     """What all laws have in common.
 
     type: the word of the YAML key ``type``; kind: passive | reactive | active; doc: a sentence for the case reference.
-    kernels: the module with the law's `KERNELS` (`mechanics.laws.kernels`). active_from, active_until: it acts in
+    kernels: the module with the law's `KERNELS` (`mechanics.laws.law_kernels`). active_from, active_until: it acts in
     [active_from, active_until), times in s; None leaves that side open. A law with a free length l0 has the field
     ``free_length``, None for each member's initial length.
     """

@@ -10,7 +10,7 @@ import math
 
 from mdstopo.case.joints import DistanceJoint
 from mdstopo.compiler.jit import kernel
-from mdstopo.mechanics.joints.kernels import FITTED, AtHome, JointKernels
+from mdstopo.mechanics.joints.joint_kernels import FITTED, AtHome, JointKernels
 from mdstopo.mechanics.joints.revolute import apart_since, arms
 from mdstopo.mechanics.laws.spring import elongation_of
 

@@ -4,7 +4,7 @@ Parameters: those of the revolute joint. theta_0 is the angle at home.
 """
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.mechanics.joints.kernels import JointKernels
+from mdstopo.mechanics.joints.joint_kernels import JointKernels
 from mdstopo.mechanics.joints.revolute import (
     point_at_home,
     revolute_acceleration_slopes,

@@ -10,7 +10,7 @@ Parameters: s_A (2), s_B (2), n_0 (2), -, -, n . D at home. theta_0 is the angle
 
 from mdstopo.case.joints import PrismaticJoint
 from mdstopo.compiler.jit import kernel
-from mdstopo.mechanics.joints.kernels import AtHome, JointKernels
+from mdstopo.mechanics.joints.joint_kernels import AtHome, JointKernels
 from mdstopo.mechanics.joints.revolute import apart_since, arms
 
 

@@ -4,9 +4,9 @@ Parameters: s_A (2), s_B (2), -, -, -, -, Phi at home (2). Used by the fixed joi
 """
 
 from mdstopo.compiler.jit import part
-from mdstopo.mechanics.joints.kernels import AtHome, JointKernels
+from mdstopo.mechanics.joints.joint_kernels import AtHome, JointKernels
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
-from mdstopo.scene.model import HOME_X, HOME_Y
+from mdstopo.scene.springs_model import HOME_X, HOME_Y
 
 #: places of w: x, y of a body and by what angle it has turned since home, for both; cos and sin of both angles psi;
 #: then what has changed since home: x and y of both, cos and sin of both

@@ -887,8 +887,8 @@ def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, 
       model: the compiled scene.
       p (3 or more,): k, c, preload of the law.
       start, count: the first spring (padded), and how many there are.
-      row: of a grid, how many behind each other begin at one point, or minus that; else 0 (`general.model.ROW`).
-      counted, member_state, r, tangent: as of `member_sums`.
+      row: of a grid, how many behind each other begin at one point, or minus that; else 0
+      (`general.general_model.ROW`). counted, member_state, r, tangent: as of `member_sums`.
     Out:
       o (SUMS,): added to.
     """

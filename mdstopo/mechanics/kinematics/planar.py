@@ -12,15 +12,15 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.kernel import Kernel
+from mdstopo.mechanics.joints.joint_table import joint_acceleration_slopes as acceleration_slopes_by_code
+from mdstopo.mechanics.joints.joint_table import joint_gamma as gamma_by_code
+from mdstopo.mechanics.joints.joint_table import joint_is_point as is_point_by_code
+from mdstopo.mechanics.joints.joint_table import joint_rows as rows_by_code
+from mdstopo.mechanics.joints.joint_table import joint_stiffness as stiffness_by_code
+from mdstopo.mechanics.joints.joint_table import joint_transmitted
+from mdstopo.mechanics.joints.joint_table import joint_velocity_slope as velocity_slope_by_code
 from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_vjp
 from mdstopo.mechanics.joints.revolute import place_joint as place_joint_of_bodies
-from mdstopo.mechanics.joints.table import joint_acceleration_slopes as acceleration_slopes_by_code
-from mdstopo.mechanics.joints.table import joint_gamma as gamma_by_code
-from mdstopo.mechanics.joints.table import joint_is_point as is_point_by_code
-from mdstopo.mechanics.joints.table import joint_rows as rows_by_code
-from mdstopo.mechanics.joints.table import joint_stiffness as stiffness_by_code
-from mdstopo.mechanics.joints.table import joint_transmitted
-from mdstopo.mechanics.joints.table import joint_velocity_slope as velocity_slope_by_code
 from mdstopo.mechanics.kinematics import (
     planar_bushings,
     planar_contacts,
@@ -81,7 +81,7 @@ from mdstopo.mechanics.kinematics.planar_scales import (
 from mdstopo.mechanics.kinematics.planar_scales import (
     noise_of as noise_of_pair,
 )
-from mdstopo.scene.model import HOME_X, HOME_Y
+from mdstopo.scene.springs_model import HOME_X, HOME_Y
 
 COORDINATES = FREEDOMS = ROWS = 3
 ROTATIONS = 1

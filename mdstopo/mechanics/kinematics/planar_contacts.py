@@ -9,7 +9,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.contact import CLOSED, LENGTH, contact_force, contact_pose, second_rise
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
-from mdstopo.scene.model import HOME_X, HOME_Y
+from mdstopo.scene.springs_model import HOME_X, HOME_Y
 
 #: directions in which a contact pushes: along the edge, and normal to it
 DIRECTIONS = 2

@@ -3,8 +3,8 @@
 import numpy as np
 
 from mdstopo.compiler.jit import entry
+from mdstopo.mechanics.joints.joint_table import joint_reaction, joint_rows
 from mdstopo.mechanics.joints.revolute import PLACES, place_joint
-from mdstopo.mechanics.joints.table import joint_reaction, joint_rows
 
 
 @entry

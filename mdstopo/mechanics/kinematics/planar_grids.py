@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, load, store, total, unmarked, where_larger, zero
-from mdstopo.mechanics.grids import PLACES
+from mdstopo.mechanics.grid_passes import PLACES
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.mechanics.laws.spring_grid import (
     add_column,
@@ -29,7 +29,7 @@ from mdstopo.mechanics.laws.spring_grid import (
     turned_columns,
 )
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.scene.model import EXCESS, L0, PX, PY, QX, QY
+from mdstopo.scene.springs_model import EXCESS, L0, PX, PY, QX, QY
 
 #: rows of a tile, where a grid has so many
 ROWS = 32

@@ -10,7 +10,7 @@ import math
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
-from mdstopo.scene.model import HOME_X, HOME_Y
+from mdstopo.scene.springs_model import HOME_X, HOME_Y
 
 
 @kernel

@@ -26,10 +26,10 @@ from mdstopo.mechanics.laws.alike import (
     elastic_designs_of_rows,
     far,
 )
+from mdstopo.mechanics.laws.law_table import SPRING, law, law_is_idle
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent, elongation_of
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.mechanics.laws.table import SPRING, law, law_is_idle
-from mdstopo.scene.model import EXCESS, HOME_X, HOME_Y, L0, PX, PY, QX, QY
+from mdstopo.scene.springs_model import EXCESS, HOME_X, HOME_Y, L0, PX, PY, QX, QY
 
 
 @inline

@@ -13,7 +13,7 @@ digits of members that hardly stretch.
 import math
 
 from mdstopo.compiler.jit import part
-from mdstopo.scene.model import HOME_COS, HOME_SIN, HOME_X, HOME_Y
+from mdstopo.scene.springs_model import HOME_COS, HOME_SIN, HOME_X, HOME_Y
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A, then what has changed since
 #: home: d - d_0, cos theta - cos theta_0, sin theta - sin theta_0

@@ -36,7 +36,7 @@ from mdstopo.compiler.vector import (
     where_larger,
     zero,
 )
-from mdstopo.mechanics.grids import PLACES
+from mdstopo.mechanics.grid_passes import PLACES
 from mdstopo.mechanics.kinematics.spatial_forces import K
 from mdstopo.mechanics.kinematics.spatial_poses import D_RATE, D_SINCE, FREEDOMS, S_SINCE, D, S, W
 from mdstopo.mechanics.kinematics.spatial_springs import (
@@ -52,7 +52,7 @@ from mdstopo.mechanics.kinematics.spatial_springs import (
 )
 from mdstopo.mechanics.kinematics.vectors import cross, dot, minus, plus, put, times, turned, vector_at
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.scene.model import MANY
+from mdstopo.scene.springs_model import MANY
 
 #: rows of a tile, where a grid has so many
 ROWS = 32

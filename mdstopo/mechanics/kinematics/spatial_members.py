@@ -78,9 +78,9 @@ from mdstopo.mechanics.kinematics.vectors import (
     unit,
     vector_at,
 )
+from mdstopo.mechanics.laws.law_table import SPRING, law, law_is_idle
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.mechanics.laws.table import SPRING, law, law_is_idle
-from mdstopo.scene.model import MANY
+from mdstopo.scene.springs_model import MANY
 
 
 @part

@@ -6,7 +6,7 @@ Modes: linear, held at +limit, held at -limit.
 import numpy as np
 
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.kernels import LawKernels, Modes
+from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes
 
 LINEAR, UPPER, LOWER = range(3)
 

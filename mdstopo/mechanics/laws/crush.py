@@ -7,7 +7,7 @@ grows with its elongation; it is written down when crushing ends, where y is F /
 """
 
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.kernels import LawKernels, Modes, PermanentSet
+from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, PermanentSet
 
 OPEN, ELASTIC, CRUSHING = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide

@@ -1,7 +1,7 @@
 """`cubic`: f = k1 x + k3 x^3, V = k1 x^2/2 + k3 x^4/4. Parameters: k1, k3."""
 
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.kernels import LawKernels
+from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 
 @inline

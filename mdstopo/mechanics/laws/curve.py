@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.case.laws import CurveLaw
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.kernels import LawKernels, Modes
+from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes
 
 #: how far a piece goes on beyond its ends, relative to the narrowest: what rests on a knot does not change its mode by
 #: rounding, and the force is off by no more than the square of it

@@ -5,21 +5,21 @@ switches, whether any of these depends on time, which group has the force's slop
 the switches at which slopes begin with a root (`formula.sharp`), and on which sides of switches nothing acts
 (`formula.idle`). Its groups of numbers are those of `formula.law_formulas`.
 
-The mode's bits say on which side each switch is; as long as they stay the formulas are smooth (`formula.modes`). A bit
-above them says that nothing acts.
+The mode's bits say on which side each switch is; as long as they stay the formulas are smooth (`formula.smooth_modes`).
+A bit above them says that nothing acts.
 """
 
 import math
 
 import numpy as np
 
-from mdstopo.case.laws.expression import OfFormulas
+from mdstopo.case.laws.expression_law import OfFormulas
 from mdstopo.compiler.formulas import address_of, call_formula
 from mdstopo.compiler.jit import inline
 from mdstopo.formula.idle import as_numbers
 from mdstopo.formula.law_formulas import FIRST, FORCE, LOWEST
-from mdstopo.formula.modes import MOST_SWITCHES
-from mdstopo.mechanics.laws.kernels import LawKernels, Modes
+from mdstopo.formula.smooth_modes import MOST_SWITCHES
+from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes
 
 #: place in the row of where the data begin
 AT = 7

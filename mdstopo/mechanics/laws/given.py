@@ -3,7 +3,7 @@
 from mdstopo.case.arrays import Table
 from mdstopo.case.laws import TableLaw
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.kernels import LawKernels
+from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 
 @inline

@@ -1,7 +1,7 @@
 """`spring` (Eq. 2) in scalar form: f = k x + c x' + preload, V = k x^2/2. Parameters: k, c, preload."""
 
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.kernels import LawKernels
+from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 
 @inline

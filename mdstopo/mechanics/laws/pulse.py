@@ -4,7 +4,7 @@ import math
 
 from mdstopo.case.laws import PulseLaw
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.kernels import LawKernels
+from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 
 @inline

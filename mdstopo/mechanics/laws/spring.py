@@ -60,7 +60,7 @@ def _elongation(rx, ry, r2, y, ux, uy, free, excess):
 def hardly_moved(r, near):
     """Whether a pose r (POSE,) is so near home that members would lose digits in a difference of lengths.
 
-    near (2,): a row of `scene.model.Model.near`. Beyond it, elongations from displacements are no better.
+    near (2,): a row of `scene.springs_model.Model.near`. Beyond it, elongations from displacements are no better.
     """
     return r[10] * r[10] + r[11] * r[11] < near[0] and r[12] * r[12] + r[13] * r[13] < near[1]
 

@@ -1,0 +1,395 @@
+"""From Python to the compiled entries that price candidates of any laws (`pricing_states`, `candidate_prices`)."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mdstopo.case.laws import Law
+from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.compiler.threads import allowed
+from mdstopo.general import candidate_prices as kernels
+from mdstopo.general.candidate_prices import FIELDS, NODE, NODES, PLACES
+from mdstopo.general.compile_general import GeneralScene
+from mdstopo.general.dimension import dimension_of, in_frame
+from mdstopo.general.extremes import COLUMNS, FRACTION, RATE, STEP
+from mdstopo.general.general_model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
+from mdstopo.general.pricing_states import OF_A_ROW, keep_states, states_of_sum
+from mdstopo.general.row_gradients import sign_of, wanted_rows
+from mdstopo.general.step_history import FIRST
+from mdstopo.general.variables import as_computed
+from mdstopo.mechanics.laws.law_table import SPRING, kernels_of, may_switch
+from mdstopo.scene.bodies import stands_as
+from mdstopo.scene.origin import starting_places
+from mdstopo.scene.springs_model import FloatArray, IndexArray
+from mdstopo.sensitivity.candidate_pass import CandidatePass
+from mdstopo.sensitivity.reductions import INTEGRALS
+from mdstopo.sensitivity.springs_candidate_prices import TILE_NUMBERS
+
+if TYPE_CHECKING:
+    from mdstopo.general.general_driver import GeneralDriver
+
+#: the highest power of time that virtual changes within a step have, and stages from which on they have it
+HIGHEST, MANY = 3, 8
+#: which square an integral is of, by `INTEGRALS`
+SQUARED = 2
+
+
+class ScenePricingStates(NamedTuple):
+    """The states of one load case from which prices follow, of a weighted sum of rows.
+
+    case, scene: as compiled. model: of the run, whose segments may be more than the scene's. pairs: the number of each
+    pair among those that are kept. steps: where the law of a group switches. The others as of `states_of_sum`.
+    """
+
+    case: Case
+    scene: GeneralScene
+    model: GeneralModel
+    pairs: dict[int, int]
+    pose: FloatArray
+    change: FloatArray
+    pose_a: FloatArray
+    energy: FloatArray
+    when: FloatArray
+    segment: IndexArray
+    steps: "Steps | None"
+
+
+class PricingStates(NamedTuple):
+    """The states from which the price of any member follows: of all load cases, and of all samples of a case."""
+
+    scenes: tuple[ScenePricingStates, ...]
+
+    @classmethod
+    def of_all(cls, parts: "Sequence[PricingStates]") -> "PricingStates":
+        """Those of several motions together."""
+        return cls(tuple(scene for part in parts for scene in part.scenes))
+
+
+class _Rows(NamedTuple):
+    """Rows and integrals with their weights, as `states_of_sum` takes them."""
+
+    which: IndexArray
+    rows: FloatArray
+    factor: FloatArray
+    integrals: IndexArray
+    share: FloatArray
+
+
+def pricing_states_of(driver: "GeneralDriver", factor: FloatArray) -> PricingStates:
+    """The states from which prices follow, of the rows of a driver's last evaluation times factor (n_resp, R)."""
+    model, count = driver.model_of_run, driver.count
+    index = driver.room_ints[: 4 * (int(driver.limits[1]) + 1)].reshape(-1, 4)
+    chosen = _rows_of(driver, factor)
+    pairs = {int(block[PAIR]): None for block in model.block if driver.case.members[block[GROUP]].candidates}
+    size = driver.scene.kinematics
+    n_state, each = int(index[count, FIRST]) + OF_A_ROW * len(chosen.rows), size.freedoms
+    pose = np.zeros((n_state, len(pairs), size.pose_size))
+    change, pose_a = np.zeros((2, n_state, len(pairs), each))
+    energy, when, segment = np.zeros(n_state), np.zeros(n_state), np.full(n_state, -1)
+    scratch = np.zeros((1, len(driver.padded)))
+    arguments: tuple[Any, ...] = (
+        *driver.steps_arguments(count)[:4], driver.limits, count, *chosen, np.array(list(pairs), dtype=np.int64),
+        driver.room, driver.room_ints, driver.member_state, scratch, pose, change, pose_a, energy, when, segment,
+        driver.work,
+    )  # fmt: skip
+    states_of_sum(*arguments)
+    numbers = {pair: number for number, pair in enumerate(pairs)}
+    own = ScenePricingStates(
+        driver.case, driver.scene, model, numbers, pose, change, pose_a, energy, when, segment, None
+    )  # fmt: skip
+    if any(_switches(law) for group in driver.case.priced_groups for law in group.laws):
+        own = own._replace(steps=steps_of(driver, own, index, chosen.rows))
+    return PricingStates((own,))
+
+
+def _switches(law: Law) -> bool:
+    """Whether members of a law have to be followed through their modes."""
+    modes = kernels_of(type(law)).modes
+    return may_switch(law) and modes is not None and not modes.pieces
+
+
+def _rows_of(driver: "GeneralDriver", factor: FloatArray) -> _Rows:
+    """The rows that a driver has found, each part of it with its weight; factor (n_resp, R): of rows."""
+    rows = [
+        (row, factor[row.response, row.row] * sign_of(driver, row.response, row.row) * row.share)
+        for row in wanted_rows(driver, False)
+    ]
+    rows = [each for each in rows if each[1] != 0.0]
+    integrals = [
+        (j, INTEGRALS[name] == SQUARED, factor[j, 0] * driver.rows[j, 0, RATE])
+        for j, name in enumerate(driver.scene.reductions)
+        if name in INTEGRALS and factor[j, 0] != 0.0
+    ]
+    return _Rows(
+        np.array([[row.response, 0] for row, _ in rows], dtype=np.int64).reshape(-1, 2),
+        np.array([row.at for row, _ in rows]).reshape(-1, COLUMNS),
+        np.array([weight for _, weight in rows], dtype=np.float64),
+        np.array([each[:2] for each in integrals], dtype=np.int64).reshape(-1, 2),
+        np.array([each[2] for each in integrals], dtype=np.float64),
+    )
+
+
+class GeneralCandidates(CandidatePass[PricingStates]):
+    """The candidates of a group of any laws; place: its number in the case. The rest as of `CandidatePass`."""
+
+    def __init__(
+        self, place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None = None
+    ) -> None:
+        # as `scene.origin.ends_of` has it
+        super().__init__(group, homes, group.body_to == GROUND, count)
+        self._place = place
+        self._last: tuple[PricingStates, tuple[IndexArray, FloatArray]] | None = None
+
+    def tiles(self, states: PricingStates, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
+        """(T, TILE_NUMBERS): what `price_tiles` keeps of each tile."""
+        out = np.empty((*self.shape, TILE_NUMBERS))
+        packed = self._packed(states, self.chosen)
+        kernels.price_tiles(*self._room(states), *packed, self.common(worth), *built, allowed(), out)
+        return out.reshape(-1, TILE_NUMBERS)
+
+    def prices_between(self, states: PricingStates, a: IndexArray, b: IndexArray) -> FloatArray:
+        """The derivatives (K,) by alpha of members from first points to second ones."""
+        if self._last is None or self._last[0] is not states:
+            self._last = states, self._packed(states, (slice(None), slice(None)))
+        found, room = np.empty(len(a)), self._room(states)
+        for start in range(0, len(a), PLACES):
+            part = slice(start, start + PLACES)
+            places = np.stack([a[part], b[part]]).astype(np.int64)
+            out = np.empty(places.shape[1])
+            kernels.price_places(*room, *self._last[1], places, out)
+            found[part] = out
+        return found
+
+    def _room(self, states: PricingStates) -> tuple[IndexArray, FloatArray]:
+        """A packed scene with room for the members of a tile, and for the numbers of any of the scenes' laws."""
+        scene, model = states.scenes[0].scene, states.scenes[0].model
+        segments = len(model.active)
+        room = model._replace(
+            block=np.zeros((1, ROW + 1), dtype=np.int64),
+            law=np.zeros((1, model.law.shape[1])),
+            active=np.ones((segments, 1), dtype=np.int64),
+            level=np.zeros((segments, 1, 2)),
+            power=np.ones(1),
+            member=np.zeros((len(model.member), PLACES)),
+            curves=np.zeros(_most_curves(states)),
+        )
+        return pack_general(room, scene.kinematics)
+
+    def _packed(
+        self, states: PricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]
+    ) -> tuple[IndexArray, FloatArray]:
+        """A packed `candidate_prices.PricedCandidates`; chosen: which points of both grids."""
+        curves = np.zeros((len(states.scenes), _most_curves(states)))
+        points: list[list[FloatArray]] = []
+        runs: list[_Run] = []
+        rows: list[list[int]] = []
+        state = step = node = 0
+        for number, scene in enumerate(states.scenes):
+            curves[number, : len(scene.model.curves)] = scene.model.curves
+            points.append(self._points(scene, chosen))
+            for run in self._runs(scene):
+                code, before, from_start = run.row
+                ends = state + len(run.when), step + len(run.step)
+                rows.append([number, code, state, state + before, ends[0], step, ends[1], from_start])
+                run.step[:, : kernels.FIRST_NODE] += state
+                run.step[:, kernels.FIRST_NODE] += node
+                runs.append(run)
+                (state, step), node = ends, node + len(run.node_pose)
+        arrays: tuple[Any, ...] = (
+            np.array(rows, dtype=np.int64),
+            np.array([run.rest for run in runs]),
+            np.array([run.law for run in runs]).reshape(len(runs), -1),
+            curves,
+            *(np.concatenate([getattr(run, name) for run in runs]) for name in kernels.ARRAYS),
+            *(np.array(each) for each in zip(*points, strict=True)),
+            *(each[k].T for each, k in zip(self.homes, chosen, strict=True)),
+        )
+        return FIELDS.packed(kernels.PricedCandidates(*arrays))
+
+    def _points(
+        self, scene: ScenePricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]
+    ) -> list[FloatArray]:
+        """Points of both grids (d, n) as a scene has them: in body frames, at the start, where its case has them."""
+        case, load_case = scene.case, scene.scene.load_case
+        group, dimension = case.members[self._place], dimension_of(case)
+        names = (group.body_from, group.body_to)[self.order]
+        local = [
+            in_frame(dimension.frames(load_case), name, points)
+            for name, points in zip(names, (group.from_local, group.to_local)[self.order], strict=True)
+        ]
+        stated = starting_places(case.bodies, group)[self.order]
+        home = list(stated)
+        if not stands_as(case, load_case):
+            bodies = scene.scene.bodies
+            home = [
+                dimension.places(scene.model.home, bodies.index(name), points)
+                for name, points in zip(names, local, strict=True)
+            ]
+        pairs = (local, home, stated)
+        return [each[side][chosen[side]].T for each in pairs for side in range(2)]
+
+    def _runs(self, scene: ScenePricingStates) -> "list[_Run]":
+        """The states of each law of the group in a scene."""
+        model, group = scene.model, as_computed(scene.case).members[self._place]
+        blocks = np.flatnonzero(model.block[:, GROUP] == self._place)
+        return [_run_of(scene, k, record) for k, record in zip(blocks.tolist(), group.laws, strict=True)]
+
+
+class _Run(NamedTuple):
+    """A row of `candidate_prices.PricedCandidates.run` with its states, steps and nodes; each as there.
+
+    row: the law's code, how many states there are before the first one whose energy counts, and whether it acts from
+    the start.
+    """
+
+    row: tuple[int, int, int]
+    rest: float
+    law: FloatArray
+    pose: FloatArray
+    change: FloatArray
+    pose_a: FloatArray
+    energy: FloatArray
+    when: FloatArray
+    level: FloatArray
+    step: IndexArray
+    step_time: FloatArray
+    node_pose: FloatArray
+    node_a: FloatArray
+    node_change: FloatArray
+    node_level: FloatArray
+    node_energy: FloatArray
+
+
+def _run_of(scene: ScenePricingStates, k: int, record: Law) -> _Run:
+    """The states of the law of block k in a scene."""
+    model, pair = scene.model, scene.pairs[int(scene.model.block[k, PAIR])]
+    free, code = getattr(record, "free_length", None), int(model.block[k, CODE])
+    moves, stores = scene.change[:, pair].any(axis=1), scene.energy != 0.0
+    acts = (scene.segment >= 0) & (model.active[scene.segment, k] != 0)
+    steps = scene.steps if _switches(record) else None
+    before = 0
+    if steps is not None:
+        states = np.arange(len(scene.when))
+    elif code == SPRING and not model.law[k, 1:3].any():
+        # forces and energies of springs are summed apart
+        moved, stored = np.flatnonzero(acts & moves), np.flatnonzero(acts & stores)
+        states, before = np.concatenate([moved, stored]), len(moved)
+    else:
+        states = np.flatnonzero(acts & (moves | stores))
+    change = scene.change[states, pair]
+    change[before if before else len(change) :] = 0.0
+    level = _level(model, k, scene.segment[states], scene.when[states])
+    parts = _no_steps(scene.pose.shape[2], change.shape[1]) if steps is None else _steps_of_law(steps, model, k, pair)
+    return _Run(
+        (code, before, int(model.active[0, k])), -1.0 if free is None else float(free), model.law[k],
+        scene.pose[states, pair][:, None], change[:, None], scene.pose_a[states, pair], scene.energy[states],
+        scene.when[states], level, *parts,
+    )  # fmt: skip
+
+
+def _level(model: GeneralModel, k: int, segment: IndexArray, when: FloatArray) -> FloatArray:
+    """The tabulated force of the law of block k at times (T,) of segments (T,)."""
+    first, slope = model.level[segment, k].T
+    force: FloatArray = first + slope * (when - model.times[segment])
+    return force
+
+
+class Steps(NamedTuple):
+    """The steps of a motion, in the order in which members that switch go through them, each with its nodes.
+
+    step (K, 5), step_time (K, 2): as of `candidate_prices.PricedCandidates`. segment (K,): in which each is.
+    pose (nodes, G, POSE), pose_a, change (nodes, G, D), energy (nodes,): at the nodes.
+    """
+
+    step: IndexArray
+    step_time: FloatArray
+    segment: IndexArray
+    pose: FloatArray
+    pose_a: FloatArray
+    change: FloatArray
+    energy: FloatArray
+
+
+def steps_of(driver: "GeneralDriver", states: ScenePricingStates, index: IndexArray, rows: FloatArray) -> Steps:
+    """The steps of a driver's last run, with partial ones and states of rows between them.
+
+    driver: with the run. states: those of its rows. index: of its history. rows (R, COLUMNS): whose states these are.
+    """
+    count, t = driver.count, driver.states()[0]
+    found: list[tuple[tuple[float, int, int, int], list[int], tuple[float, float], tuple[int, float]]] = []
+    for w in range(count):
+        stages = [int(index[w, FIRST]), int(index[w + 1, FIRST])]
+        found.append(((t[w], 3, 0, 0), [*stages, kernels.WHOLE], (t[w], t[w + 1] - t[w]), (w, 1.0)))
+    for m, row in enumerate(rows):
+        k, c, at = int(row[STEP]), float(row[FRACTION]), int(index[count, FIRST]) + OF_A_ROW * m
+        used = int((states.segment[at + 1 : at + OF_A_ROW] >= 0).sum())
+        begin, length = t[k], t[k + 1] - t[k]
+        inside = 0.0 < c < 1.0
+        if used:
+            stages = [at + 1, at + 1 + used]
+            found.append(((begin, 1, m, 0), [*stages, kernels.PART], (begin, c * length), (k, c)))
+        key = (begin, 1, m, 1) if used else (begin, 4, m, 0) if inside else (begin + max(c, 0.0) * length, 0, m, 0)
+        found.append((key, [at, at + 1, kernels.POINT], (begin + c * length, 0.0), (k, c)))
+    found.sort(key=lambda each: each[0])
+    moves = states.change.any(axis=(1, 2)) | (states.energy != 0.0)
+    step = [
+        [*where[:2], NODES * number, where[2], int(moves[where[0] : where[1]].any())]
+        for number, (_, where, _, _) in enumerate(found)
+    ]
+    times = np.array([each[2] for each in found])
+    places = np.array([[k, min(c, 1.0) * node] for _, _, _, (k, c) in found for node in NODE])
+    (q, out), _, _ = driver.sample_response(-1, places, False, count)
+    pose, pose_a = np.zeros((len(places), *states.pose.shape[1:])), np.zeros((len(places), *states.pose_a.shape[1:]))
+    pairs = np.array(list(states.pairs), dtype=np.int64)
+    keep_states(driver.ints, driver.floats, q, out[0], out[1], pairs, pose, pose_a)
+    change, energy = (
+        [_between_stages(values, states.when, slice(*where[:2]), *time) for (_, where, time, _) in found]
+        for values in (states.change, states.energy)
+    )
+    return Steps(
+        np.array(step, dtype=np.int64).reshape(-1, 5), times, states.segment[[each[0] for each in step]], pose, pose_a,
+        np.concatenate(change), np.concatenate(energy),
+    )  # fmt: skip
+
+
+def _between_stages(values: FloatArray, when: FloatArray, stages: slice, begin: float, length: float) -> FloatArray:
+    """What sums over the stages of a step are sums of, at the nodes of the step, by its fraction, (NODES, ...).
+
+    It is the polynomial with the same moments: sums over stages of what is smooth in time are exact to a high order.
+    values (T, ...): of states: virtual changes of pairs, or weights of the energy. when (T,): their times (s).
+    stages: which of them are the step's. begin, length: of the step (s).
+    """
+    own = values[stages]
+    if length <= 0.0 or not own.any():
+        return np.zeros((NODES, *own.shape[1:]))
+    degree = HIGHEST if len(own) >= MANY else min(len(own) - 1, HIGHEST - 1)
+    fraction = (when[stages] - begin) / length
+    at_stages = np.polynomial.legendre.legvander(2.0 * fraction - 1.0, degree)
+    at_nodes = np.polynomial.legendre.legvander(2.0 * NODE - 1.0, degree) * (2.0 * np.arange(degree + 1) + 1.0)
+    found: FloatArray = np.tensordot(at_nodes @ at_stages.T, own, axes=1)
+    return found
+
+
+def _steps_of_law(steps: Steps, model: GeneralModel, k: int, pair: int) -> tuple[Any, ...]:
+    """The steps in which the law of block k acts, with their nodes, as of `_Run`."""
+    acts = model.active[steps.segment, k] != 0
+    nodes = np.flatnonzero(np.repeat(acts, NODES))
+    step = steps.step[acts].copy()
+    step[:, kernels.FIRST_NODE] = NODES * np.arange(len(step))
+    time = steps.step_time[acts]
+    when = (time[:, :1] + time[:, 1:] * NODE).ravel()
+    level = _level(model, k, np.repeat(steps.segment[acts], NODES), when)
+    kept = steps.pose[nodes, pair], steps.pose_a[nodes, pair], steps.change[nodes, pair]
+    return step, time, *kept, level, steps.energy[nodes]
+
+
+def _no_steps(pose: int, freedoms: int) -> tuple[Any, ...]:
+    """No steps and nodes, as of `_Run`; pose, freedoms: numbers of a pose and of its change."""
+    nodes = np.zeros((0, pose)), np.zeros((0, freedoms)), np.zeros((0, freedoms)), np.zeros(0), np.zeros(0)
+    return np.zeros((0, 5), dtype=np.int64), np.zeros((0, 2)), *nodes
+
+
+def _most_curves(states: PricingStates) -> int:
+    """The most numbers that the laws of a scene have."""
+    return max(len(scene.model.curves) for scene in states.scenes)

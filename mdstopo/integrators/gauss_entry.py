@@ -1,6 +1,0 @@
-"""What the driver calls of the Gauss method."""
-
-import mdstopo.integrators.gauss_linear  # noqa: F401  (enters the method's functions in the interface's table)
-from mdstopo.integrators.gauss import TAG, simulate
-
-__all__ = ["TAG", "simulate"]

@@ -1,0 +1,279 @@
+"""Gauss collocation, linearised: dense output, the reverse step, the tangent step (`steps_interface`).
+
+All three work on the stages that `gauss.simulate` kept. Reverse and tangent steps solve the same linear balance of a
+window, transposed or not, by sweeps that contract as the forward ones did.
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.integrators.rows import (
+    combine_rows,
+    copy_row,
+    integrate_to_nodes,
+    largest_difference,
+    make_rows,
+    renew_rows,
+    row_width,
+    scale_rows,
+    take_rows,
+)
+from mdstopo.integrators.springs_gauss import COUNTS, TAG, GaussSteps
+from mdstopo.integrators.springs_gauss_equations import accelerations_vjp, dense_rows, fill_dense
+from mdstopo.integrators.steps import FIRST, LEVEL, REVERSE, SWEEPS, Q, V
+from mdstopo.integrators.steps_interface import implement
+from mdstopo.mechanics.assembly import (
+    add_turning,
+    subtract_products,
+)
+
+
+@kernel
+def _polynomials(c, s, first, second):
+    """first, second (s,) = I1_k, I2_k at c, by recurrence."""
+    x = 2.0 * c - 1.0
+    below = 1.0
+    here = x
+    i_below = 0.0
+    i_here = c
+    value = 0.5 * c * c
+    for k in range(s):
+        above = ((2 * k + 3) * x * here - (k + 1) * below) / (k + 2)
+        i_above = (above - below) / (2 * (2 * k + 3))
+        if k > 0:
+            value = (i_above - i_below) / (2 * (2 * k + 1))
+        first[k] = i_here
+        second[k] = value
+        below = here
+        here = above
+        i_below = i_here
+        i_here = i_above
+
+
+@kernel
+def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
+    """The collocation polynomial of window k; see `steps_interface.point_of`. Returns k and c."""
+    o = steps.index[k, FIRST]
+    s = steps.index[k + 1, FIRST] - o
+    h = steps.t[k + 1] - steps.t[k]
+    state = steps.state[k]
+    stage = steps.stage
+    first = np.empty(s)
+    second = np.empty(s)
+    _polynomials(c, s, first, second)
+    for d in range(q.shape[0]):
+        q[d] = state[Q, d] + h * c * state[V, d]
+        v[d] = state[V, d]
+    for j in range(s):
+        for d in range(q.shape[0]):
+            v[d] += h * first[j] * stage[o + j, 2, d]
+            q[d] += h * h * second[j] * stage[o + j, 2, d]
+    return k, c
+
+
+@kernel
+def _point_weights(legendre, s, c, beta_q, beta_v):
+    """Weights of the node accelerations in q(c) (times h^2) and v(c) (times h)."""
+    first = np.empty(s)
+    second = np.empty(s)
+    _polynomials(c, s, first, second)
+    for j in range(s):
+        beta_q[j] = 0.0
+        beta_v[j] = 0.0
+        for k in range(s):
+            beta_q[j] += second[k] * legendre[k, j]
+            beta_v[j] += first[k] * legendre[k, j]
+
+
+@kernel
+def parent_of(steps, w):
+    """The window before: windows follow one another."""
+    return w - 1
+
+
+@kernel
+def stage_weights(tables, steps, w, out):
+    """Gauss weights, times the length of the window."""
+    level = steps.index[w, LEVEL]
+    h = steps.t[w + 1] - steps.t[w]
+    for j in range(COUNTS[level]):
+        out[j] = h * tables[level, 0, 1, j]
+
+
+@kernel
+def carried(steps):
+    """None: a window takes over nothing but q and v."""
+    return 0
+
+
+@part
+def reverse_step(
+    pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
+    accuracy, work,
+):  # fmt: skip
+    """By sweeps of the window's transposed equations; see `steps_interface.reverse_step`. Not used: lam_x."""
+    level = steps.index[w, LEVEL]
+    s = COUNTS[level]
+    n = lam_q.shape[0]
+    o = steps.index[w, FIRST]
+    h = steps.t[w + 1] - steps.t[w]
+    planes = tables[level]
+    second = planes[2]
+    first = planes[1]
+    k = steps.K[o : o + s]
+    c = steps.C[o : o + s] if damped else steps.C
+    turn = steps.turn[o : o + s] if turning else steps.turn
+    spread = stage_q_bar.shape[0] > 0
+    work[REVERSE] += 1
+    width = row_width(n)
+    rows = make_rows(6 * s, n).reshape((6, s, width))
+    rhs = rows[0]
+    x = rows[1]
+    u = rows[2]
+    y = rows[3]
+    z_row = rows[4]
+    value = rows[5]
+    inverse = np.zeros(width)  # of the masses
+    root = np.zeros(width)
+    copy_row(inv_mass, inverse)
+    for d in range(n):
+        root[d] = np.sqrt(inv_mass[d])
+    back_q = np.empty((s, s))  # the integrations, transposed
+    back_v = np.empty((s, s))
+    for i in range(s):
+        for j in range(s):
+            back_q[j, i] = second[i, j]
+            back_v[j, i] = first[i, j]
+    beta_q = np.zeros(s)
+    beta_v = np.zeros(s)
+    if c_point >= 0.0:
+        _point_weights(planes[3], s, c_point, beta_q, beta_v)
+    for j in range(s):
+        end_q = h * h * planes[0, 2, j]
+        end_v = h * planes[0, 1, j]
+        for d in range(n):
+            rhs[j, d] = end_q * lam_q[d] + end_v * lam_v[d]
+            rhs[j, d] += h * h * beta_q[j] * mu_q[d] + h * beta_v[j] * mu_v[d]
+            if spread:
+                for i in range(s):
+                    rhs[j, d] += h * h * second[i, j] * stage_q_bar[i, d]
+    take_rows(rhs, s, x)
+    kinds = 2 if damped else 1
+    dense = make_rows(kinds * s * dense_rows(n), n).reshape((kinds, s, dense_rows(n), width))
+    if dense.shape[2] > 0:
+        fill_dense(pair, k, turn, turning, inverse, s, np.bool_(True), dense[0])
+        if damped:
+            fill_dense(pair, c, turn, np.bool_(False), inverse, s, np.bool_(True), dense[1])
+    last = np.inf
+    for _ in range(200):
+        work[SWEEPS] += 1
+        accelerations_vjp(pair, k, c, turn, dense, inverse, x, s, damped, turning, z_row, u, y)
+        if damped:
+            combine_rows(back_v, s, s, h, rhs, y, value)
+            change, size = renew_rows(back_q, s, h * h, value, u, root, x)
+        else:
+            change, size = renew_rows(back_q, s, h * h, rhs, u, root, x)
+        if change <= max(accuracy, 4e-16) * size or (change >= last and change <= 1e-13 * size):
+            break
+        last = change
+    for d in range(n):
+        position = lam_q[d] + mu_q[d]
+        speed = lam_v[d] + h * lam_q[d] + mu_v[d] + h * max(c_point, 0.0) * mu_q[d]
+        for i in range(s):
+            z[i, d] = inv_mass[d] * x[i, d]
+            reached = u[i, d] + (stage_q_bar[i, d] if spread else 0.0)
+            position += reached
+            speed += h * planes[0, 0, i] * reached + y[i, d]
+        lam_q[d] = position
+        lam_v[d] = speed
+
+
+@kernel
+def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
+    """By sweeps of the window's linear equations; see `steps_interface.tangent_step`. Not used: dx."""
+    level = steps.index[w, LEVEL]
+    s = COUNTS[level]
+    n = dq.shape[0]
+    o = steps.index[w, FIRST]
+    h = steps.t[w + 1] - steps.t[w]
+    planes = tables[level]
+    k = steps.K[o : o + s]
+    c = steps.C[o : o + s] if damped else steps.C
+    turn = steps.turn[o : o + s] if turning else steps.turn
+    width = row_width(n)
+    rows = make_rows(6 * s, n).reshape((6, s, width))
+    da = rows[0]
+    dq_row = rows[1]
+    dv_row = rows[2]
+    rhs = rows[3]
+    value = rows[4]
+    none = rows[5]
+    vectors = np.zeros((5, width))
+    inverse = vectors[0]  # of the masses
+    root = vectors[1]
+    start_q = vectors[2]
+    start_v = vectors[3]
+    hdv = vectors[4]
+    copy_row(inv_mass, inverse)
+    for d in range(n):
+        root[d] = 1.0 / np.sqrt(inv_mass[d]) if inv_mass[d] > 0.0 else 0.0
+        start_q[d] = dq[d]
+        start_v[d] = dv[d]
+        hdv[d] = h * dv[d]
+    last = np.inf
+    for _ in range(200):
+        integrate_to_nodes(planes[2], s, s, h * h, start_q, hdv, planes[0, 0], da, dq_row)
+        for i in range(s):
+            for d in range(n):
+                rhs[i, d] = force[i, d]
+        subtract_products(pair, k, dq_row, rhs, s)
+        if turning:
+            add_turning(turn, dq_row, rhs, s)
+        if damped:
+            integrate_to_nodes(planes[1], s, s, h, start_v, none[0], planes[0, 0], da, dv_row)
+            subtract_products(pair, c, dv_row, rhs, s)
+        scale_rows(inverse, rhs, s, value)
+        change = largest_difference(value, da, root, s)
+        size = largest_difference(value, none, root, s)
+        take_rows(value, s, da)
+        if change <= 4e-16 * size or (change >= last and change <= 1e-13 * size):
+            break
+        last = change
+    integrate_to_nodes(planes[2], s, s, h * h, start_q, hdv, planes[0, 0], da, dq_row)
+    for i in range(s):
+        for d in range(n):
+            dq_stage[i, d] = dq_row[i, d]
+    beta_q = np.empty(s)
+    beta_v = np.empty(s)
+    reached = 1.0
+    if c_point >= 0.0:
+        reached = c_point
+        _point_weights(planes[3], s, c_point, beta_q, beta_v)
+    else:
+        for j in range(s):
+            beta_v[j] = planes[0, 1, j]
+            beta_q[j] = planes[0, 2, j]
+    for d in range(n):
+        dq[d] += h * reached * dv[d]
+        for j in range(s):
+            dq[d] += h * h * beta_q[j] * da[j, d]
+            dv[d] += h * beta_v[j] * da[j, d]
+
+
+@kernel
+def steps_of(tag, arrays):
+    """The arrays as this method's steps."""
+    return GaussSteps(*arrays)
+
+
+implement(
+    GaussSteps,
+    TAG,
+    steps_of=steps_of,
+    point_of=point_of,
+    parent_of=parent_of,
+    stage_weights=stage_weights,
+    reverse_step=reverse_step,
+    tangent_step=tangent_step,
+    carried=carried,
+)
