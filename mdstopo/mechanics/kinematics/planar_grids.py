@@ -105,7 +105,7 @@ def _sum_tile(member, width, scale, start, first, last, length, p, r, counted, t
     damping = p[1] / p[0]
     preload = p[2] / p[0]
     nothing = zero()
-    sums = no_columns(nothing)
+    sums = no_columns()
     energy = nothing
     pulls = nothing, nothing, nothing
     qx = member[QX * width + start : QX * width + start + length]
@@ -115,7 +115,7 @@ def _sum_tile(member, width, scale, start, first, last, length, p, r, counted, t
         done = (1 << (begin - i)) - 1
         ax, ay = turned_columns(qx, qy, i, r[2], r[3])
         moved = moved_columns(qx, qy, i, r)
-        own = no_members(nothing)
+        own = no_members()
         pull_x = nothing
         pull_y = nothing
         seen = seen_in_row(ax, ay, room, np.int64(0))
