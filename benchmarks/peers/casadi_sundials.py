@@ -27,7 +27,7 @@ def objective_of(
 ) -> Objective:
     """The benchmark's objective of any equations of motion.
 
-    problem: what is computed, of which only the members, the end and whether a peak is wanted are looked at.
+    problem: of it the number of members, the end and whether a peak is wanted are used.
     model: its expressions. start: the state at the start. tolerance, method, compiled: as of `make`.
     """
     # time runs to 1, and the end is a parameter, so that a run to another time needs no other integrator

@@ -48,7 +48,7 @@ def provide(code: Code) -> bool:
 
 @functools.cache
 def arrays_are_known() -> bool:
-    """Whether the fields of array objects are where `compiler.build` has machine code look for them."""
+    """Whether the fields of array objects are where `numba_private.build` has machine code look for them."""
     array = np.zeros((2, 3))
     words = (ctypes.c_int64 * (LENGTHS + 1)).from_address(id(array))
     dimensions = ctypes.c_int32.from_address(id(array) + 8 * DIMENSIONS).value

@@ -40,7 +40,7 @@ def profile(
     found, at_best: its minimum, and the statistics there.
     i: which estimate; one that is neither at a bound nor unknown.
     points: how many on each side.
-    stop: is asked before each motion; where it says yes, `solve.StoppedError` is raised.
+    stop: is asked before each motion; where it says yes, `least_squares.StoppedError` is raised.
     """
     half = at_best.factor * at_best.deviation[i]
     held = np.array([i])

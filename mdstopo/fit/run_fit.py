@@ -162,7 +162,7 @@ def _unprofiled(run: FitRun, points: int) -> list[str]:
 
 
 def restored(problem: FitProblem, content: Mapping[str, Any]) -> FitRun:
-    """What a run that was stopped had done, from what `record.content` made of it."""
+    """What a run that was stopped had done, from what `fit_record.content` made of it."""
     run = FitRun(problem, simulations=int(content["simulations"] or 0))
     for each in content["starts"]:
         level = float("inf") if each["level"] is None else float(each["level"])

@@ -83,7 +83,7 @@ def statistics(problem: FitProblem, found: Minimum) -> Statistics:
 def quantile(problem: FitProblem) -> float:
     """Half the width of the interval in deviations: of Student's distribution where deviations are estimated.
 
-    With the degrees of freedom by which they are estimated (`solve.deviation_of`).
+    With the degrees of freedom by which they are estimated (`least_squares.deviation_of`).
     """
     from scipy.stats import norm, t
 

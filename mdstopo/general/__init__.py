@@ -4,10 +4,10 @@ Scenes of springs between free bodies whose responses are stored energies have k
 `integrators`, `sensitivity`), which know nothing of what is here. This package computes everything else, and the same
 scenes too, by its own formulas, so that the two families check each other.
 
-    model        a scene as arrays          members        all laws, summed over members at one pose
-    forces       all that acts              accelerations  with multipliers, from forces
-    projection   back onto the joints       events         members that switch
-    adaptive_steps, generalized_alpha, gauss               steps through time
-    step_history what they leave behind     responses      numbers of a state
-    adjoint, direct                         general_driver what Python calls
+    general_model    a scene as arrays      members            all laws, summed over members at one pose
+    forces           all that acts          accelerations      with multipliers, from forces
+    projection       back onto the joints   events             members that switch
+    adaptive_steps, generalized_alpha, gauss                   steps through time
+    step_history     what they leave        general_responses  numbers of a state
+    adjoint, direct  their derivatives      general_driver     what Python calls
 """

@@ -202,8 +202,8 @@ def row_cotangents(
       model: the compiled scene.
       count, j: how many steps there are; the response.
       row (COLUMNS,): the row.
-      across: instead of the norm that g_j is (`responses.is_norm`), the component perpendicular to its vector is
-        differentiated, the direction held.
+      across: instead of the norm that g_j is (`general_responses.is_norm`), the component perpendicular to its vector
+        is differentiated, the direction held.
     In and out:
       history: the history of steps; a partial step is kept behind the others where the integrator needs one.
       member_state (3, columns): state of the members; modes and sets become those of the step in hand.

@@ -10,7 +10,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, LoadCase, MemberGroup, Response, ResponseRow
 from mdstopo.case.responses import kind_of
 from mdstopo.compiler.threads import allowed
-from mdstopo.general import general_responses as responses_of
+from mdstopo.general import general_responses
 from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in_frame
 from mdstopo.general.driven_integrals import integration_times
 from mdstopo.general.drives import Drives, drives, drives_all, motion_times
@@ -31,7 +31,7 @@ from mdstopo.general.variables import (
 from mdstopo.integrators.integrator_choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.kinematics.timed import ADDRESS
-from mdstopo.mechanics.laws import law_table as laws
+from mdstopo.mechanics.laws import law_table
 from mdstopo.scene.bodies import distances, stands_as
 from mdstopo.scene.grid_members import row_of, short_row_of
 from mdstopo.scene.origin import ends_of
@@ -267,7 +267,7 @@ def _members(
             length = distances(dimension.places(home, index[second_body], q_local) - first_ends)
         for place, record in enumerate(group.laws):
             rest = getattr(record, "free_length", None)
-            kernels, code = laws.kernels_of(type(record)), laws.code_of(type(record))
+            kernels, code = law_table.kernels_of(type(record)), law_table.code_of(type(record))
             begin = -np.inf if record.active_from is None else record.active_from
             until = np.inf if record.active_until is None else record.active_until
             middle = 0.5 * (times[:-1] + times[1:])
@@ -285,7 +285,7 @@ def _members(
                 member[MEMBER_EXCESS, :count] = (length[part] - free) * (length[part] + free)
                 variable = first + int(part[0]) if group.design else -1
                 blocks.append([pair, start, start + padded, code, variable, count, number, int(part[0]), row])
-                rows.append(laws.parameters(record, curves))
+                rows.append(law_table.parameters(record, curves))
                 powers.append(group.power)
                 columns.append(member)
                 active.append((middle > begin) & (middle < until))
@@ -294,7 +294,7 @@ def _members(
         first += len(group) if group.design else 0
     return {
         "block": np.array(blocks, dtype=np.int64).reshape(-1, ROW + 1),
-        "law": np.array(rows, dtype=np.float64).reshape(-1, laws.PARAMETERS),
+        "law": np.array(rows, dtype=np.float64).reshape(-1, law_table.PARAMETERS),
         "active": np.array(active, dtype=np.int64).reshape(-1, segments).T.copy(),
         "level": np.array(level, dtype=np.float64).reshape(-1, segments, 2).transpose(1, 0, 2).copy(),
         "power": np.array(powers, dtype=np.float64),
@@ -376,7 +376,7 @@ def _responses(
             first += len(response.of)
             continue
         record = kind_of(response)
-        code = responses_of.code_of(record)
+        code = general_responses.code_of(record)
         body = index[response.body or GROUND]
         reference = index[response.relative_to or GROUND]
         component = dimension.components[response.component or "norm"]
@@ -405,7 +405,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
 
 def _switches(case: Case) -> bool:
     """Whether a member may switch: a step that ends at a switch ends on the polynomial of the method of order 8."""
-    return bool(case.contacts) or any(laws.may_switch(law) for group in case.members for law in group.laws)
+    return bool(case.contacts) or any(law_table.may_switch(law) for group in case.members for law in group.laws)
 
 
 def _skipped(case: Case, load_case: LoadCase, dimension: Dimension, damped: bool) -> tuple[str, ...]:

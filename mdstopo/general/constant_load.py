@@ -46,7 +46,7 @@ def hold(
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
-      ints, floats: the packed scene (`model.pack_general`).
+      ints, floats: the packed scene (`general_model.pack_general`).
       alpha (N,): the design.
       limits, room, room_ints: the history of steps, as of `carve_history`.
       count, j: how many steps there are; the response.

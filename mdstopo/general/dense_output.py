@@ -116,7 +116,7 @@ def evaluate_here(tag, motion, j, k, c, who, rates, balanced, purpose):
     motion: the finished motion; a, lam, bars, row_bar and the workspace are overwritten.
     j: the response; below 0 only the balance is made. k, c: the step, and the fraction of it.
     who: the member whose force is meant; -1: the one with the largest.
-    rates, balanced: whether the rate is wanted, and a and lam whatever the response needs (`responses.rated`).
+    rates, balanced: whether the rate is wanted, and a and lam whatever the response needs (`general_responses.rated`).
     purpose: place in `work` of what the balances are for (`integrators.steps`).
 
     Returns the value, its rate (per s) and the number of the member.

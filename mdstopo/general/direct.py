@@ -378,7 +378,7 @@ def push(
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
-      ints, floats: the packed scene (`model.pack_general`).
+      ints, floats: the packed scene (`general_model.pack_general`).
       alpha (N,): the design.
       limits: steps allowed, and the sizes of the history's arrays (`carve_history`).
       count, j: how many steps there are; the response.
@@ -615,7 +615,7 @@ def follow(
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
-      ints, floats: the packed scene (`model.pack_general`).
+      ints, floats: the packed scene (`general_model.pack_general`).
       alpha (N,): the design.
       limits, room, room_ints: the history of steps, as of `carve_history`.
       count: how many steps there are.

@@ -71,7 +71,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     """Integrate a design over `model.times` in fixed steps.
 
     Constant:
-      ints, floats: the packed scene (`model.pack_general`).
+      ints, floats: the packed scene (`general_model.pack_general`).
       tables (1,): the spectral radius.
       alpha (N,): the design.
       tangent: not read; tangents are always kept.

@@ -61,7 +61,7 @@ def by_constant_load(
 
 
 def _run_again(driver: "GeneralDriver", alpha: FloatArray) -> int:
-    """Simulate with tangents, which is not counted as work; how many steps that took."""
+    """Simulate again, with tangents; its work is added to what was counted. Returns how many steps that took."""
     before = driver.work.copy()
     _, count, _ = driver.run(alpha, True, driver.quadrature_breakpoints)
     driver.work += before

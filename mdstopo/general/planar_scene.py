@@ -11,7 +11,7 @@ from mdstopo.general.contact_compile import edge_rows
 from mdstopo.general.dimension import Dimension, Frames, Pairs
 from mdstopo.general.timed_loads import TimedPart
 from mdstopo.mechanics.contact import PX, PY
-from mdstopo.mechanics.joints import joint_table as joints
+from mdstopo.mechanics.joints import joint_table
 from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.kinematics.timed import MOMENT, PUSH
 from mdstopo.scene.compile_scene import home_of
@@ -65,7 +65,7 @@ def _bushings(case: Case, index: dict[str, int], pairs: Pairs, home: FloatArray)
     for bushing in case.bushings:
         a, b = (index[name] for name in bushing.bodies)
         where.append(pairs.setdefault((a, b), len(pairs)))
-        apart = joints.apart_at_home(home, a, b, bushing.at_first, bushing.at_second)
+        apart = joint_table.apart_at_home(home, a, b, bushing.at_first, bushing.at_second)
         c, s = home[a, HOME_COS:]
         x, y = c * apart[0] + s * apart[1], c * apart[1] - s * apart[0]
         rows.append([*bushing.at_first, *bushing.at_second, x, y, *bushing.stiffness, *bushing.damping])
@@ -78,7 +78,7 @@ def _reaches(contact: FloatArray) -> FloatArray:
 
 def _joint_row(joint: Joint, home: FloatArray, first: int, second: int, frames: Frames) -> list[float]:
     del frames
-    return joints.parameters(joint, home, first, second)
+    return joint_table.parameters(joint, home, first, second)
 
 
 def _response_row(response: Response, frames: Frames) -> list[float]:
@@ -106,9 +106,9 @@ PLANE = Dimension(
     half_turn=lambda pairs, home, q: None,
     contacts=edge_rows,
     reaches=_reaches,
-    joint_code=joints.code_of,
-    joint_kernels=joints.kernels_of,
-    has_norm=lambda kind: joints.kernels_of(kind).force_rows > 1,
+    joint_code=joint_table.code_of,
+    joint_kernels=joint_table.kernels_of,
+    has_norm=lambda kind: joint_table.kernels_of(kind).force_rows > 1,
     joint_row=_joint_row,
     response_row=_response_row,
 )

@@ -18,7 +18,7 @@ KEPT = 32
 
 
 class _Block(NamedTuple):
-    """Rows of one reverse sweep: what `row_sweep.pull_rows` takes, by its names."""
+    """Rows of one reverse sweep: what `row_sweep.rows_vjp` takes, by its names."""
 
     which: IndexArray
     rows: FloatArray

@@ -10,7 +10,7 @@ from mdstopo.general.general_model import unpack_general
 from mdstopo.general.method_interface import implement
 from mdstopo.general.step_history import carve_history
 from mdstopo.general.step_inside import make_stages
-from mdstopo.integrators import springs_runge_kutta as runge_kutta
+from mdstopo.integrators import springs_runge_kutta
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
 
 TAG = (0,)
@@ -41,7 +41,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
 @kernel
 def step_error(tag, vectors, s, h, longest, a, weight):
     """That of springs, too; see `method_interface.step_error`."""
-    return runge_kutta.step_error(vectors, s, h, longest, a, weight)
+    return springs_runge_kutta.step_error(vectors, s, h, longest, a, weight)
 
 
 @kernel

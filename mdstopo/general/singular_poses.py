@@ -101,7 +101,7 @@ def error_along(model, workspace, vectors, s, h, a, weight, whole, sigma):
       workspace: workspace with the factors of the joints' matrix at the end of the step.
       h: length of the step (s).
       a (s or more, n): accelerations at its stages (m/s^2, rad/s^2).
-      weight (n,): weights of the coordinates (1/m, 1/rad; `integrators.steps.motion_weights`).
+      weight (n,): weights of the coordinates (1/m, 1/rad; `kinematics_interface.motion_weights`).
       whole: the whole error (`integrators.springs_runge_kutta.step_error`).
       sigma: least singular value of the joints at the end of the step.
 

@@ -25,7 +25,7 @@ from mdstopo.general.kinks import landed
 from mdstopo.general.moved_ends import WIDTH, MovedEnds, rows_of_ends
 from mdstopo.integrators.integrator_choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
-from mdstopo.mechanics.laws import law_table as laws
+from mdstopo.mechanics.laws import law_table
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: parts of the simulated time, each of one step at least, where a mode may come and go by time alone
@@ -43,18 +43,18 @@ def each_member(case: Case, group: MemberGroup, place: int) -> bool:
 
 
 def lasting_times(case: Case, fine: bool) -> list[float]:
-    """Times at which laws have steps end, without those that vary; fine: as of `laws.breakpoints`."""
+    """Times at which laws have steps end, without those that vary; fine: as of `law_table.breakpoints`."""
     return [
         time
         for group in case.members
         for place, law in enumerate(group.laws)
-        for time in laws.breakpoints(law, fine, frozenset(each.parameter for each in of_law(case, group, place)))
+        for time in law_table.breakpoints(law, fine, frozenset(each.parameter for each in of_law(case, group, place)))
     ]
 
 
 def watched_times(case: Case, load_case: LoadCase) -> list[float]:
     """Times at which steps end so that modes which come and go by time alone are seen; none where no law has such."""
-    if not any(laws.is_watched(law) for group in case.members for law in group.laws):
+    if not any(law_table.is_watched(law) for group in case.members for law in group.laws):
         return []
     times: list[float] = np.linspace(load_case.start, load_case.end, WATCHED + 1)[1:-1].tolist()
     return times
@@ -109,7 +109,7 @@ def varied(case: Case, block: IndexArray) -> IndexArray:
         for group, law in zip(variable.groups, variable.laws, strict=True):
             own = blocks[group, law]
             record = case.members[int(block[own[0], GROUP])].laws[law]
-            place = laws.place_of(type(record), variable.parameter)
+            place = law_table.place_of(type(record), variable.parameter)
             for i, k in enumerate(own):
                 members = int(block[k, START]), int(block[k, START] + block[k, COUNT])
                 rows.append([k, place, first + (i if variable.each == "member" else 0), 0, *members])
@@ -164,12 +164,12 @@ class Placing:
         for k, (record, taken) in self._taken.items():
             changed = {name: float(values[c]) for name, c in taken.items()}
             now = replace(record, **changed)
-            if laws.kernels_of(type(now)).data is None:
-                law[k] = laws.parameters(now, [])
+            if law_table.kernels_of(type(now)).data is None:
+                law[k] = law_table.parameters(now, [])
             else:
                 for name, value in changed.items():
-                    place = laws.place_of(type(now), name)
-                    if place < laws.PARAMETERS:
+                    place = law_table.place_of(type(now), name)
+                    if place < law_table.PARAMETERS:
                         law[k, place] = value
             if "free_length" in changed:
                 first = int(model.block[k, START])
@@ -178,7 +178,7 @@ class Placing:
                 member[MEMBER_FREE_LENGTH, part] = free
                 member[MEMBER_EXCESS, part] += (was - free) * (was + free)
             if changed.keys() & with_role(type(now), "is_time"):
-                times |= {t for t in laws.breakpoints(now, self._fine) if start < t < end}
+                times |= {t for t in law_table.breakpoints(now, self._fine) if start < t < end}
                 begin = -np.inf if now.active_from is None else now.active_from
                 until = np.inf if now.active_until is None else now.active_until
                 acts[k] = begin, until
@@ -195,7 +195,7 @@ class Placing:
             begin, until = acts.get(int(row[0]), (np.nan, np.nan))
             # a law with a force at rest can only begin earlier: if it began later, the equilibrium would be another
             begins = begin == start and int(row[0]) not in held
-            row[3] = (row[1] == laws.ACTIVE_FROM and begins) or (row[1] == laws.ACTIVE_UNTIL and until == end)
+            row[3] = (row[1] == law_table.ACTIVE_FROM and begins) or (row[1] == law_table.ACTIVE_UNTIL and until == end)
         return model._replace(active=active, varied=varied)
 
     def with_twins(self, model: GeneralModel, bodies: Kinematics) -> GeneralModel:

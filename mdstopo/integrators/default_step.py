@@ -38,8 +38,8 @@ class _Run:
 def default_step(driver: SceneDriver, alpha: FloatArray) -> float:
     """What to put into `driver.settings[2]` so that errors are about `AIM` tolerances (settings[0]) at alpha (N,).
 
-    Negative: radians of the fastest vibration a step (`generalized_alpha.longest_step`). The error meant is that
-    of the objectives and of the largest entry of their gradients, relative; without objectives that of the motion.
+    Negative: radians of the fastest vibration a step (`springs_generalized_alpha.longest_step`). The error meant is
+    that of the objectives and of the largest entry of their gradients, relative; without objectives that of the motion.
     """
     times = driver.scene.model.times
     span = float(times[-1] - times[0])

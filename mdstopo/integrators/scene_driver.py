@@ -200,10 +200,10 @@ class DriverOptions:
     """What a driver is made for, beside its scene.
 
     method: the integrator. tolerance: relative error that objectives and gradients may have. step: fixed step (s); 0:
-    adaptive steps; negative: see `generalized_alpha.longest_step`. looked: the responses, those of objectives first.
-    design (N + P,): the array that every design is put in, shared with whoever gives designs. beside: another process
-    that may be compiling what evaluates responses. fits: whether joints are to fit at the start, which a kernel finds
-    out.
+    adaptive steps; negative: see `springs_generalized_alpha.longest_step`. looked: the responses, those of objectives
+    first. design (N + P,): the array that every design is put in, shared with whoever gives designs. beside: another
+    process that may be compiling what evaluates responses. fits: whether joints are to fit at the start, which a kernel
+    finds out.
     """
 
     method: Method

@@ -1,8 +1,9 @@
 """Compiled entries of generalized-alpha: what Python calls (`driver`), with everything in few arrays.
 
 In all of them: the packed model; tables (1,) the spectral radius; settings (tolerance, not used here; Newton
-tolerance; step, see `generalized_alpha.longest_step`; closeness); limits (steps allowed, room for steps, room for
-stages); room, room_ints for the steps; strength (3 or more, M_padded), see `active_members`; work counts, added to.
+tolerance; step, see `springs_generalized_alpha.longest_step`; closeness); limits (steps allowed, room for steps,
+room for stages); room, room_ints for the steps; strength (3 or more, M_padded), see `active_members`; work
+counts, added to.
 """
 
 import numpy as np
@@ -31,7 +32,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
       damped: whether any force depends on velocity.
       tangent: not used; tangents are always kept.
       settings (3 or more,): tolerance, which is not used; Newton tolerance; step (s), negative: radians of the fastest
-        vibration (`generalized_alpha.longest_step`).
+        vibration (`springs_generalized_alpha.longest_step`).
       limits (3,): steps allowed, room for steps, room for stages.
     Out:
       room, room_ints: the steps (`steps.carve`).

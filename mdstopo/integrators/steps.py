@@ -162,7 +162,7 @@ def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning
 
 
 # Numba's own assignment of an array to a slice brings code that formats its error messages into every kernel: seconds
-# of compilation. Hence these, and `geometry.copy_rows`.
+# of compilation. Hence these, and `planar_poses.copy_rows`.
 
 
 @part

@@ -8,7 +8,7 @@
 Bounds are eliminated variable by variable and e row by row, so that each Newton step solves one dense system
 of the size of the rows (function and linear) plus one for z, whatever N. Steps are Mehrotra's predictor and
 corrector. Here the problem is scaled (v = (x - lower)/(upper - lower), rows by their largest slope) and
-started; `kernels.py` iterates.
+started; `interior_kernels.py` iterates.
 """
 
 from dataclasses import dataclass

@@ -129,8 +129,9 @@ class Problem(Protocol):
         options `peaks` and `peak_window` say.
     even (int, else 0): how many of the last variables are drawn uniformly at every random start, because no part of
         their range is likelier than another.
-    softened(share) -> Problem: the same problem with members that have only this share of their strength, with which a
-        start of the family `starts.Family.SOFTENED` begins; without it such a start begins as the first one does.
+    softened(share) -> Problem: the same problem with members that have only this share of their strength, with which
+        a start of the family `start_families.Family.SOFTENED` begins; without it such a start begins as the first
+        one does.
     exchange_ends(x, side, rng) -> x: another design that is alike, but far away (`exchange`); without it starts of the
         families OTHER_FROM and OTHER_TO begin near x.
     """

@@ -77,8 +77,10 @@ def by_iterative(driver: "Driver", alpha: FloatArray, looked: ResponseResult) ->
 
 
 def _run_again(driver: "Driver", alpha: FloatArray) -> tuple[Status, int]:
-    """Simulate with tangents, which values alone may do without, and which is not counted as work; its status and how
-    many steps it took."""
+    """Simulate again, with the tangents that a run for values leaves out; its work is added to what was counted.
+
+    Returns its status and how many steps it took.
+    """
     before = driver.work.copy()
     code, count, _ = driver.run(alpha, True)
     driver.work += before

@@ -11,7 +11,7 @@ import pytest
 MODULE = """
 import sys
 import numpy as np
-from mdstopo.compiler import store, compiled_units as units
+from mdstopo.compiler import compiled_units as units, store
 from mdstopo.compiler.jit import entry, kernel
 
 units.SPLIT, units.LONG, units._OURS = __name__, 1, "_ZN8__main__"

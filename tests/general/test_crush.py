@@ -9,14 +9,13 @@ import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import CrushLaw
 from mdstopo.case.reader import read_case
-from mdstopo.mechanics.laws import crush
-from mdstopo.mechanics.laws import law_table as table
+from mdstopo.mechanics.laws import crush, law_table
 from mdstopo.status import Status
 from tests.compiled import compiled
 from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text, slopes
 
 OPEN, ELASTIC, CRUSHING = crush.OPEN, crush.ELASTIC, crush.CRUSHING
-CRUSH = table.CODES["crush"]
+CRUSH = law_table.CODES["crush"]
 
 ONE = """
 format: 1
@@ -50,37 +49,37 @@ def one(end=1.5, v=-3.0, g=-10.0, foot=-1.0, more="gap: 0.1"):
 
 @compiled
 def _law(p, x, mode):
-    return table.law(CRUSH, p, x, 0.0, mode, 0.0, 0.0, np.empty(0), 1.0)
+    return law_table.law(CRUSH, p, x, 0.0, mode, 0.0, 0.0, np.empty(0), 1.0)
 
 
 @compiled
 def _margin(p, x, xd, mode):
-    return table.law_margin(CRUSH, p, x, xd, mode, 0.0, np.empty(0), 1.0)
+    return law_table.law_margin(CRUSH, p, x, xd, mode, 0.0, np.empty(0), 1.0)
 
 
 @compiled
 def _slopes(p, x, xd, mode):
-    return table.law_margin_slopes(CRUSH, p, x, xd, mode, 0.0, np.empty(0), 1.0)
+    return law_table.law_margin_slopes(CRUSH, p, x, xd, mode, 0.0, np.empty(0), 1.0)
 
 
 @compiled
 def _next(p, x, mode):
-    return table.law_next(CRUSH, p, x, 0.0, 0.0, mode, 0.0, np.empty(0), 1.0)
+    return law_table.law_next(CRUSH, p, x, 0.0, 0.0, mode, 0.0, np.empty(0), 1.0)
 
 
 @compiled
 def _start(p, x, xd, xdd):
-    mode = table.law_start(CRUSH, p, x, xd, xdd, 0.0, np.empty(0), 1.0)
-    return mode, table.law_first_set(CRUSH, p, x, mode)
+    mode = law_table.law_start(CRUSH, p, x, xd, xdd, 0.0, np.empty(0), 1.0)
+    return mode, law_table.law_first_set(CRUSH, p, x, mode)
 
 
 @compiled
 def _set(p, x, old, new):
-    return table.law_set(CRUSH, p, x, old, new)
+    return law_table.law_set(CRUSH, p, x, old, new)
 
 
 def row_of(side, gap=0.1):
-    return np.array(table.parameters(CrushLaw(stiffness=50.0, force=4.0, gap=gap, side=side), []))
+    return np.array(law_table.parameters(CrushLaw(stiffness=50.0, force=4.0, gap=gap, side=side), []))
 
 
 @pytest.mark.parametrize(("side", "s"), [("tension", 1.0), ("compression", -1.0)])

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from mdstopo.case.laws.expression_law import with_parameters
 from mdstopo.case.model import ActuatorLaw, CubicLaw, GapLaw, Law, PulseLaw, SpringLaw
-from mdstopo.mechanics.laws import law_table as table
+from mdstopo.mechanics.laws import law_table
 from tests.formula.random_formulas import evaluate
 from tests.space.in_python import in_python  # noqa: F401
 
@@ -31,47 +31,47 @@ class Kernels:
 
     def __init__(self, law: Law) -> None:
         self.law = law
-        self.code = table.code_of(type(law))
+        self.code = law_table.code_of(type(law))
         curves: list[float] = [1.0, 2.0, 3.0]
-        self.p = np.array(table.parameters(law, curves))
+        self.p = np.array(law_table.parameters(law, curves))
         self.curves = np.array(curves)
 
     def start(self, x: float, xd: float, t: float = 0.0) -> int:
         """The mode at the start."""
-        return int(table.law_start(self.code, self.p, x, xd, 0.0, t, self.curves, REST))
+        return int(law_table.law_start(self.code, self.p, x, xd, 0.0, t, self.curves, REST))
 
     def at(self, x: float, xd: float, mode: int, t: float = 0.0) -> Any:
         """f, f_x, f_xd, V, V_x."""
-        return np.array(table.law(self.code, self.p, x, xd, mode, t, 0.0, self.curves, REST))
+        return np.array(law_table.law(self.code, self.p, x, xd, mode, t, 0.0, self.curves, REST))
 
     def by(self, place: int, x: float, xd: float, mode: int, t: float = 0.0) -> Any:
         """Derivatives of f and V by a parameter."""
-        return np.array(table.law_slopes(self.code, self.p, place, x, xd, mode, t, 0.0, self.curves, REST))
+        return np.array(law_table.law_slopes(self.code, self.p, place, x, xd, mode, t, 0.0, self.curves, REST))
 
     def by_time(self, x: float, xd: float, mode: int, t: float) -> float:
         """Derivative of f by time."""
-        return float(table.law_by_time(self.code, self.p, x, xd, mode, t, self.curves, REST))
+        return float(law_table.law_by_time(self.code, self.p, x, xd, mode, t, self.curves, REST))
 
     def margin(self, x: float, xd: float, mode: int, t: float = 0.0) -> float:
         """The margin."""
-        return float(table.law_margin(self.code, self.p, x, xd, mode, t, self.curves, REST))
+        return float(law_table.law_margin(self.code, self.p, x, xd, mode, t, self.curves, REST))
 
     def margin_by(self, place: int, x: float, xd: float, mode: int, t: float = 0.0) -> float:
         """Its derivative by a parameter."""
-        return float(table.law_margin_slope(self.code, self.p, place, x, xd, mode, t, self.curves, REST))
+        return float(law_table.law_margin_slope(self.code, self.p, place, x, xd, mode, t, self.curves, REST))
 
     def margin_slopes(self, x: float, xd: float, mode: int, t: float = 0.0) -> list[float]:
         """Its derivatives by x, xd and t."""
-        both = table.law_margin_slopes(self.code, self.p, x, xd, mode, t, self.curves, REST)
-        return [*both, table.law_margin_by_time(self.code, self.p, x, xd, mode, t, self.curves, REST)]
+        both = law_table.law_margin_slopes(self.code, self.p, x, xd, mode, t, self.curves, REST)
+        return [*both, law_table.law_margin_by_time(self.code, self.p, x, xd, mode, t, self.curves, REST)]
 
     def is_idle(self, mode: int) -> bool:
         """Whether nothing acts."""
-        return bool(table.law_is_idle(self.code, mode))
+        return bool(law_table.law_is_idle(self.code, mode))
 
     def next(self, x: float, xd: float, mode: int, t: float = 0.0) -> int:
         """The mode behind the end of a mode."""
-        return int(table.law_next(self.code, self.p, x, xd, 0.0, mode, t, self.curves, REST))
+        return int(law_table.law_next(self.code, self.p, x, xd, 0.0, mode, t, self.curves, REST))
 
 
 GAP = {"k": 300.0, "c": 7.0, "g": 0.02}
@@ -118,11 +118,13 @@ def test_built_in_laws_written_as_formulas_have_the_same_values_and_slopes(kind:
             modes = one.start(x, xd, t), other.start(x, xd, t)
             found = other.at(x, xd, modes[1], t)
             np.testing.assert_allclose(found, one.at(x, xd, modes[0], t), rtol=1e-12, atol=1e-12)
-            for place in range(len(table.numbers(type(other.law)))):
+            for place in range(len(law_table.numbers(type(other.law)))):
                 by = one.by(place, x, xd, modes[0], t)
                 np.testing.assert_allclose(other.by(place, x, xd, modes[1], t), by, rtol=1e-12, atol=1e-12)
-            rest = one.by(table.FREE_LENGTH, x, xd, modes[0], t)
-            np.testing.assert_allclose(other.by(table.FREE_LENGTH, x, xd, modes[1], t), rest, rtol=1e-12, atol=1e-12)
+            rest = one.by(law_table.FREE_LENGTH, x, xd, modes[0], t)
+            np.testing.assert_allclose(
+                other.by(law_table.FREE_LENGTH, x, xd, modes[1], t), rest, rtol=1e-12, atol=1e-12
+            )
 
 
 @pytest.mark.parametrize("kind", ["gap", "gap compressed", "gap clipped", "gap of energy", "actuator"])
@@ -212,7 +214,7 @@ def test_forces_and_all_slopes_are_those_of_complex_steps(kind: str) -> None:
             # a longer free length at fixed places of the ends shortens the elongation
             moved = {**names, "x": complex(x, -STEP), "l0": complex(REST, STEP)}
             stepped = complex(second(text, moved)).imag / STEP
-            assert kernels.by(table.FREE_LENGTH, x, xd, mode, t)[0] == pytest.approx(stepped, rel=1e-10, abs=1e-10)
+            assert kernels.by(law_table.FREE_LENGTH, x, xd, mode, t)[0] == pytest.approx(stepped, rel=1e-10, abs=1e-10)
 
 
 @pytest.mark.parametrize("kind", ["hunt_crossley", "two_slopes", "switched"])

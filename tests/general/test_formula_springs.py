@@ -12,7 +12,7 @@ from mdstopo.case.laws.spring_law import SpringLaw
 from mdstopo.case.reader import read_case
 from mdstopo.formula.parser import parse
 from mdstopo.general.formula_springs import polynomial, spring_of, with_springs
-from mdstopo.mechanics.laws import law_table as table
+from mdstopo.mechanics.laws import law_table
 from tests.formula.random_formulas import evaluate
 
 from .test_expression_kernels import law_of
@@ -134,7 +134,7 @@ def test_variables_of_springs_are_those_of_springs_and_what_shares_one_with_othe
     assert [each.parameter for each in found.variables] == [parameter, "damping", "free_length"]
     for each in found.variables:
         group = next(group for group in found.members if group.name == each.groups[0])
-        assert table.place_of(type(group.laws[0]), each.parameter) >= 0
+        assert law_table.place_of(type(group.laws[0]), each.parameter) >= 0
 
 
 def test_a_case_without_such_laws_is_left_as_it_is() -> None:

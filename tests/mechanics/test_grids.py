@@ -5,7 +5,7 @@ import pytest
 
 import mdstopo.sensitivity.springs_driver
 from mdstopo.engine import Evaluator
-from mdstopo.scene import compile_scene as scenes
+from mdstopo.scene import compile_scene
 from mdstopo.scene.grid_members import STRIDE, row_of
 from mdstopo.scene.packing import chunks_of
 from mdstopo.status import Status
@@ -76,7 +76,7 @@ def test_rows_need_all_pairs_and_no_damping_and_no_preload():
 def both_ways(case, design, monkeypatch, **asked):
     found = Evaluator(case).evaluate(design, **asked)
     with monkeypatch.context() as patch:
-        patch.setattr(scenes, "row_of", lambda *_: (0, 0))
+        patch.setattr(compile_scene, "row_of", lambda *_: (0, 0))
         flat = Evaluator(case)
         assert not any(block[6] for block in flat.scenes["default"].model.block.tolist())
         return found, flat.evaluate(design, **asked)
@@ -161,7 +161,7 @@ def test_members_that_carry_nothing_are_left_out_of_a_grid_where_it_pays(absent,
     count = np.count_nonzero(design) if fewer else case.n_design
     assert found.work["spring_states"] == count * found.work["force_sums"]
     with monkeypatch.context() as patch:
-        patch.setattr(scenes, "row_of", lambda *_: (0, 0))
+        patch.setattr(compile_scene, "row_of", lambda *_: (0, 0))
         plain = Evaluator(case).evaluate(design)
     for name, slope in plain.gradients.items():
         assert np.abs(found.gradients[name] - slope).max() <= 1e-12 * np.abs(slope).max()
@@ -196,5 +196,5 @@ def test_inner_peaks_of_a_grid_are_those_of_members_in_no_order(monkeypatch):
 
 def test_the_engine_makes_its_scenes_of_grids():
     # what the tests above replace is what the engine calls
-    assert mdstopo.sensitivity.springs_driver.compile_members is scenes.compile_members
-    assert scenes.row_of is row_of
+    assert mdstopo.sensitivity.springs_driver.compile_members is compile_scene.compile_members
+    assert compile_scene.row_of is row_of

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from mdstopo.case.model import JOINTS, DistanceJoint, FixedJoint, PrismaticJoint, RevoluteJoint
 from mdstopo.compiler.jit import kernel
-from mdstopo.mechanics.joints import joint_table as table
+from mdstopo.mechanics.joints import joint_table
 from mdstopo.mechanics.joints.joint_table import CODES, WIDTH, describe, kernels_of, parameters
 from mdstopo.mechanics.joints.revolute import PLACES, place_joint
 from mdstopo.scene.springs_model import HOME
@@ -46,37 +46,37 @@ def turned(w, par):
 # Kernels have no Python wrapper: these are their callers.
 @compiled
 def _rows(code, par, w, phi, jac):
-    table.joint_rows(code, par, turned(w, par), phi, jac)
+    joint_table.joint_rows(code, par, turned(w, par), phi, jac)
 
 
 @compiled
 def _gamma(code, par, w, wd, gamma):
-    table.joint_gamma(code, par, turned(w, par), wd, gamma)
+    joint_table.joint_gamma(code, par, turned(w, par), wd, gamma)
 
 
 @compiled
 def _velocity_slope(code, par, w, wd, out):
-    table.joint_velocity_slope(code, par, turned(w, par), wd, out)
+    joint_table.joint_velocity_slope(code, par, turned(w, par), wd, out)
 
 
 @compiled
 def _acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):
-    table.joint_acceleration_slopes(code, par, turned(w, par), wd, wdd, by_q, by_v)
+    joint_table.joint_acceleration_slopes(code, par, turned(w, par), wd, wdd, by_q, by_v)
 
 
 @compiled
 def _stiffness(code, par, w, lam, k):
-    table.joint_stiffness(code, par, turned(w, par), lam, k)
+    joint_table.joint_stiffness(code, par, turned(w, par), lam, k)
 
 
 @compiled
 def _reaction(code, rows, par, w, lam, out):
-    table.joint_reaction(code, rows, par, turned(w, par), lam, out)
+    joint_table.joint_reaction(code, rows, par, turned(w, par), lam, out)
 
 
 @compiled
 def _transmitted(code, par, w, lam, which, by_lam, by_q):
-    return table.joint_transmitted(code, par, turned(w, par), lam, which, by_lam, by_q)
+    return joint_table.joint_transmitted(code, par, turned(w, par), lam, which, by_lam, by_q)
 
 
 @dataclasses.dataclass(frozen=True)

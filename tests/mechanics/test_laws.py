@@ -31,8 +31,7 @@ from mdstopo.case.model import (
     SpringLaw,
     TableLaw,
 )
-from mdstopo.mechanics.laws import actuator, gap
-from mdstopo.mechanics.laws import law_table as table
+from mdstopo.mechanics.laws import actuator, gap, law_table
 from mdstopo.mechanics.laws.law_table import CODES, PARAMETERS, parameters
 from mdstopo.mechanics.laws.law_table import breakpoints as law_breakpoints
 from mdstopo.scene.signal_segments import breakpoints
@@ -58,47 +57,47 @@ many = settings(max_examples=60, deadline=None, derandomize=True)
 # Kernels have no Python wrapper: these are their callers.
 @compiled
 def _law(code, p, x, xd, mode, t, value, curves):
-    return table.law(code, p, x, xd, mode, t, value, curves, REST)
+    return law_table.law(code, p, x, xd, mode, t, value, curves, REST)
 
 
 @compiled
 def _by_parameter(code, p, place, x, xd, mode, t, value, curves):
-    return table.law_slopes(code, p, place, x, xd, mode, t, value, curves, REST)
+    return law_table.law_slopes(code, p, place, x, xd, mode, t, value, curves, REST)
 
 
 @compiled
 def _margin_by_parameter(code, p, place, x, xd, mode, curves):
-    return table.law_margin_slope(code, p, place, x, xd, mode, TIME, curves, REST)
+    return law_table.law_margin_slope(code, p, place, x, xd, mode, TIME, curves, REST)
 
 
 @compiled
 def _margin(code, p, x, xd, mode, curves):
-    return table.law_margin(code, p, x, xd, mode, TIME, curves, REST)
+    return law_table.law_margin(code, p, x, xd, mode, TIME, curves, REST)
 
 
 @compiled
 def _slopes(code, p, x, xd, mode, curves):
-    return table.law_margin_slopes(code, p, x, xd, mode, TIME, curves, REST)
+    return law_table.law_margin_slopes(code, p, x, xd, mode, TIME, curves, REST)
 
 
 @compiled
 def _next(code, p, x, xd, xdd, mode, curves):
-    return table.law_next(code, p, x, xd, xdd, mode, TIME, curves, REST)
+    return law_table.law_next(code, p, x, xd, xdd, mode, TIME, curves, REST)
 
 
 @compiled
 def _start(code, p, x, xd, xdd, curves):
-    return table.law_start(code, p, x, xd, xdd, TIME, curves, REST)
+    return law_table.law_start(code, p, x, xd, xdd, TIME, curves, REST)
 
 
 @compiled
 def _grazes(code, p, mode, curves):
-    return table.law_grazes(code, p, 0.0, mode, TIME, curves, REST)
+    return law_table.law_grazes(code, p, 0.0, mode, TIME, curves, REST)
 
 
 @compiled
 def _switches(code, p, curves):
-    return table.law_switches(code, p, curves)
+    return law_table.law_switches(code, p, curves)
 
 
 class Kernel:
@@ -379,9 +378,9 @@ def test_slopes_are_those_of_the_kernel_in_the_same_mode(kind, seed):
 def test_slopes_by_parameters_are_differences_of_laws_with_other_parameters(kind, seed):
     kernel, x, xd, rng = drawn(kind, seed)
     record, t, value = kernel.record, signed(rng), signed(rng, 10.0)
-    names = [name for name in with_role(type(record), "varies") if name not in table.COMMON]
+    names = [name for name in with_role(type(record), "varies") if name not in law_table.COMMON]
     for name, mode in itertools.product(names, kernel.modes):
-        place, own = table.place_of(type(record), name), getattr(record, name)
+        place, own = law_table.place_of(type(record), name), getattr(record, name)
         if own is None:  # an actuator without a limit has none to vary
             continue
 

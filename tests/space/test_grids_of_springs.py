@@ -10,7 +10,7 @@ import pytest
 
 from mdstopo import Evaluation, evaluate
 from mdstopo.case.reader import read_case
-from mdstopo.general import compile_general as general_compile
+from mdstopo.general import compile_general
 from mdstopo.mechanics.kinematics import spatial_grids
 from mdstopo.mechanics.kinematics.spatial_poses import POSE
 from mdstopo.mechanics.laws.law_table import SPRING
@@ -232,10 +232,10 @@ def test_a_case_has_the_same_values_and_gradients_without_the_kernels_for_grids(
         rows.append(row_of(*arguments, **options))
         return 0, 0
 
-    row_of = general_compile.row_of
+    row_of = compile_general.row_of
     with_rows = evaluated(text)
-    monkeypatch.setattr(general_compile, "row_of", none)
-    monkeypatch.setattr(general_compile, "short_row_of", lambda group: 0)
+    monkeypatch.setattr(compile_general, "row_of", none)
+    monkeypatch.setattr(compile_general, "short_row_of", lambda group: 0)
     without = evaluated(text)
     assert rows == [(24, 21)]
     for name, value in without.objectives.items():
@@ -253,8 +253,8 @@ def test_a_pass_over_very_many_springs_is_the_same_with_any_number_of_threads(mo
     for threads in ("1", "3"):
         monkeypatch.setenv("MDSTOPO_THREADS", threads)
         found.append(evaluated(text))
-    monkeypatch.setattr(general_compile, "row_of", lambda *arguments, **options: (0, 0))
-    monkeypatch.setattr(general_compile, "short_row_of", lambda group: 0)
+    monkeypatch.setattr(compile_general, "row_of", lambda *arguments, **options: (0, 0))
+    monkeypatch.setattr(compile_general, "short_row_of", lambda group: 0)
     without = evaluated(text)
     one, three = found
     assert one.objectives == three.objectives

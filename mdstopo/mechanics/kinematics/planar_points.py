@@ -20,7 +20,7 @@ from mdstopo.mechanics.kinematics.planar_poses import small_turn
 
 @kernel
 def turned(home, angle):
-    """What `geometry.turned_body` gives for a body, from its row of `home` and the angle it has turned by (rad)."""
+    """What `planar_poses.turned_body` gives for a body, from its row of `home` and the angle it has turned by (rad)."""
     m, s = small_turn(angle)
     c = home[3] * m - home[4] * s
     s = home[4] * m + home[3] * s
