@@ -142,9 +142,9 @@ def test_an_unknown_method_is_refused_and_the_known_are_listed():
 
 def test_what_the_engine_cannot_do_is_refused_with_its_place():
     scene = spring_scene()
-    scene["members"]["spring"]["law"] = {"type": "cubic", "stiffness": 1.0, "cubic": 2.0}
+    scene["members"]["spring"]["law"] = {"type": "gap", "stiffness": 1.0, "gap": 0.1}
     for call in (simulate, evaluate):
-        with pytest.raises(CaseError, match="gauss does not compute the law cubic"):
+        with pytest.raises(CaseError, match="gauss does not compute the law gap"):
             call(read(scene, integrator="gauss"))
 
 
