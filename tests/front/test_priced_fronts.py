@@ -42,7 +42,7 @@ def test_points_are_optima_of_all_candidates_each_with_its_own_members(tmp_path:
     assert priced.front is not None
     for i, point in enumerate(priced.front.points):
         assert point is not None
-        # rounding decides whether the last step of an end comes within the optimiser's tolerance; its value is held below
+        # rounding decides whether the last step of an end comes within the tolerance; values are held below
         assert point.status in (RunStatus.CONVERGED, RunStatus.STALLED)
         assert "no one of 640 candidates would lower U by more than 0.0001 of it" in point.reason
         if i != 1:  # the ends are optima of one objective alone
