@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdstopo.compiler.jit import member_kernel, vector_entry
+from mdstopo.compiler.jit import kernel, member_kernel, vector_entry
 from mdstopo.optimizer import cones
 from mdstopo.optimizer.interior_kernels import add, dot, put
 from mdstopo.optimizer.problem import Floats, Ints
@@ -66,6 +66,15 @@ class Parts(NamedTuple):
     limit: int
     elastic: int
     total: int
+
+
+@kernel
+def _aim(gap, share):
+    """The gap to aim for: gap times share cubed (Mehrotra).
+
+    In a `member_kernel` LLVM may order the factors, which it does otherwise in some processes: last bits would differ.
+    """
+    return (share * share) * (share * gap)
 
 
 @vector_entry
@@ -255,7 +264,7 @@ def _advance(
             for k in range(len(p.excess)):
                 for i in range(3):
                     after += (cone[0, k, i] + a * step_cone[0, k, i]) * (cone[1, k, i] + a * step_cone[1, k, i])
-            target = gap * min(1.0, max(0.0, after / count / gap)) ** 3 if gap > 0.0 else 0.0
+            target = _aim(gap, min(1.0, max(0.0, after / count / gap))) if gap > 0.0 else 0.0
     if not a > LEAST:
         return False
     for side in range(2):
