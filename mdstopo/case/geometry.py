@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mdstopo.case.arrays import Components, FloatArray
@@ -56,8 +56,7 @@ class Geometry(NamedTuple):
 
 def geometry_of(dimension: int) -> Geometry:
     """The record of a dimension, 2 or 3."""
-    module, _, name = _MODULES[dimension].partition(":")
-    geometry: Geometry = getattr(importlib.import_module(module), name)
+    geometry: Geometry = resolve_name(_MODULES[dimension])
     return geometry
 
 

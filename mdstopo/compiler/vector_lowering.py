@@ -110,8 +110,6 @@ def _constant(value: float) -> Any:
 
 def _same(build: Any, number: Any) -> Any:
     """A vector of one number."""
-    if number.type != VECTOR.code.element:
-        number = build.fpext(number, VECTOR.code.element)
     places = ir.VectorType(ir.IntType(32), _LANES)
     nothing = ir.Constant(VECTOR.code, ir.Undefined)
     first = build.insert_element(nothing, number, ir.Constant(ir.IntType(32), 0))

@@ -1,5 +1,6 @@
 """The methods beside the adjoint one, by name: they differentiate the rows that a general driver has found."""
 
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.springs_model import FloatArray
 from mdstopo.sensitivity.reductions import INTEGRALS
 from mdstopo.sensitivity.springs_constant_load import DROPPED
-from mdstopo.sensitivity.springs_methods import FALLBACK, implementation
+from mdstopo.sensitivity.springs_methods import FALLBACK
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def differentiate(
 
     across (n_resp, R, N): is filled, where the method tells that (`evaluation.Peak.across`).
     """
-    found: tuple[FloatArray, str] = implementation(SENSITIVITIES[method].general)(driver, alpha, looked, across)
+    found: tuple[FloatArray, str] = resolve_name(SENSITIVITIES[method].general)(driver, alpha, looked, across)
     return found
 
 

@@ -1,6 +1,6 @@
 """Which integrator a case gets, and why: the rule of `auto`, and the methods that the records name."""
 
-import importlib
+from pkgutil import resolve_name
 
 import numpy as np
 
@@ -30,8 +30,7 @@ def choose(solver: SolverSettings, beyond: str = "", collocates: bool = False) -
 
 def method_of(name: str, solver: SolverSettings) -> Method:
     """The method of that name with the case's settings."""
-    module, _, function = INTEGRATORS[name].made_by.partition(":")
-    made: Method = getattr(importlib.import_module(module), function)(solver)
+    made: Method = resolve_name(INTEGRATORS[name].made_by)(solver)
     return made
 
 

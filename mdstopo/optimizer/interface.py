@@ -4,8 +4,8 @@ One step is one evaluation. Between two steps everything is in the state, of a c
 fields of `state.State`. So the loop can be stopped, stored and resumed anywhere without a difference in any bit.
 """
 
-import importlib
 from collections.abc import Callable
+from pkgutil import resolve_name
 from typing import Any, Protocol, cast
 
 from mdstopo.optimizer.problem import Floats, Problem, Sample
@@ -40,8 +40,7 @@ class Optimizer(Protocol):
 
 def make(problem: Problem, settings: Settings) -> Optimizer:
     """The optimiser that the settings name."""
-    module, _, name = OPTIMIZERS[settings.optimizer].made_by.partition(":")
-    return cast(Optimizer, getattr(importlib.import_module(module), name)(problem, settings))
+    return cast(Optimizer, resolve_name(OPTIMIZERS[settings.optimizer].made_by)(problem, settings))
 
 
 def reopen(optimizer: Optimizer, state: State) -> State:

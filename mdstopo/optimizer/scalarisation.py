@@ -16,13 +16,13 @@ reach every point of a front; 1 keeps U away from zero, to which tolerances are 
 (Messac, Ismail-Yahaya and Mattson 2003).
 """
 
-import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import product
 from math import prod
+from pkgutil import resolve_name
 from typing import cast
 
 import numpy as np
@@ -280,8 +280,7 @@ class NormalConstraint(Largest):
 @cache
 def formula_of(method: str) -> Formula:
     """The formula of a way to combine objectives, by its name."""
-    module, _, name = SCALARISATIONS[method].made_by.partition(":")
-    return cast(Formula, getattr(importlib.import_module(module), name)())
+    return cast(Formula, resolve_name(SCALARISATIONS[method].made_by)())
 
 
 def _choices(counts: Sequence[int]) -> list[tuple[int, ...]]:

@@ -5,10 +5,10 @@ else reads them. `State.to_arrays` and `State.from_arrays` are inverse to the bi
 is exact by construction: there is no other place in which an optimiser remembers anything.
 """
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from operator import attrgetter
+from pkgutil import resolve_name
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
@@ -223,8 +223,7 @@ class State:
 
 def class_of_states(optimizer: str) -> type[State]:
     """The class of an optimiser's states. Raises KeyError where there is none of that name."""
-    module, _, name = OPTIMIZERS[optimizer].states.partition(":")
-    return cast(type[State], getattr(importlib.import_module(module), name))
+    return cast(type[State], resolve_name(OPTIMIZERS[optimizer].states))
 
 
 _getters: dict[type[State], Any] = {}

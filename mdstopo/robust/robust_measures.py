@@ -21,11 +21,11 @@ and quantile also where points do. What competes becomes rows, whose maximum the
   rises; rows that exceed it for that reason are left out.
 """
 
-import importlib
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cache
+from pkgutil import resolve_name
 from typing import cast
 
 import numpy as np
@@ -164,8 +164,7 @@ class Worst(Quantile):
 @cache
 def _statistic_of(name: str) -> Statistic:
     """How a measure follows, by its name."""
-    module, _, made = MEASURES[name].made_by.partition(":")
-    return cast(Statistic, getattr(importlib.import_module(module), made)())
+    return cast(Statistic, resolve_name(MEASURES[name].made_by)())
 
 
 def statistic(measure: Measure, y: FloatArray, p: FloatArray) -> float:

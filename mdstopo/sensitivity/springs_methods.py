@@ -4,9 +4,7 @@
 the rows.
 """
 
-import importlib
-from collections.abc import Callable
-from functools import cache
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,16 +37,8 @@ def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: Resp
         raise ValueError(f"no sensitivity method {method!r} here")
     if kind.steps and not getattr(driver.method.kind, kind.steps):
         raise ValueError(f"the {method} method is defined on the steps of {', '.join(having(kind.steps))}")
-    found: Differentiated = implementation(kind.springs)(driver, alpha, looked)
+    found: Differentiated = resolve_name(kind.springs)(driver, alpha, looked)
     return found
-
-
-@cache
-def implementation(stated: str) -> Callable[..., Any]:
-    """The function that a record names, as module:function."""
-    module, _, name = stated.partition(":")
-    made: Callable[..., Any] = getattr(importlib.import_module(module), name)
-    return made
 
 
 def by_direct(driver: "Driver", alpha: FloatArray, looked: ResponseResult) -> Differentiated:
