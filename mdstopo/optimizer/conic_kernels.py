@@ -69,7 +69,7 @@ class Parts(NamedTuple):
 
 
 @kernel
-def _aim(gap, share):
+def _aim(gap: float, share: float) -> float:
     """The gap to aim for: gap times share cubed (Mehrotra).
 
     In a `member_kernel` LLVM may order the factors, which it does otherwise in some processes: last bits would differ.

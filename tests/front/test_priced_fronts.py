@@ -39,11 +39,10 @@ def asked(count: int = 3) -> Ask:
 def test_points_are_optima_of_all_candidates_each_with_its_own_members(tmp_path: Path) -> None:
     case = case_from(two_objectives() | LOOSE)
     priced = run_front(case, asked(), path=tmp_path / "a.h5", workers=1)
+    assert priced.status is RunStatus.CONVERGED
     assert priced.front is not None
     for i, point in enumerate(priced.front.points):
         assert point is not None
-        # rounding decides whether the last step of an end comes within the tolerance; values are held below
-        assert point.status in (RunStatus.CONVERGED, RunStatus.STALLED)
         assert "no one of 640 candidates would lower U by more than 0.0001 of it" in point.reason
         if i != 1:  # the ends are optima of one objective alone
             alone = two_objectives() | LOOSE | {"combine": {"weights": {"P": float(i == 2), "T": float(i == 0)}}}
