@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.over_time import REDUCTIONS
+
 #: laws that some parameter of can vary, and which
 VARIED = {
     "spring": ("stiffness", "preload"),
@@ -21,7 +23,7 @@ VARIED = {
     "inerter": ("inertance",),
 }
 LAWS = ("spring", "damped", "gap", "stop", "cubic", "curve", "pulse", "table", "actuator", "limited", "inerter", "two")
-REDUCTIONS = ("max", "min", "max_abs", "mean", "rms", "integral", "final")
+REDUCTION_NAMES = tuple(REDUCTIONS)
 #: the end of every scene, s
 END = 0.8
 
@@ -296,7 +298,7 @@ def _objectives(document: dict[str, Any], names: list[str], places: Any, rng: An
     for i, place in enumerate(rng.permutation(len(choices))[:3].tolist()):
         response = choices[place]
         signed = isinstance(response, dict) and ("angle" in response or "angular_velocity" in response)
-        over_time = str(rng.choice(("max_abs", "rms") if signed else REDUCTIONS))
+        over_time = str(rng.choice(("max_abs", "rms") if signed else REDUCTION_NAMES))
         document["objectives"][f"R{i}"] = {"response": response, "over_time": over_time}
     names_of = list(document["objectives"])
     document["combine"] = {"weights": dict.fromkeys(names_of, 1.0), "normalize": False}

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.hunt_model import Vector
-from benchmarks.hunt_scenes import END, LAWS, REDUCTIONS, Change, Source, random_law, vary_parameters
+from benchmarks.hunt_scenes import END, LAWS, REDUCTION_NAMES, Change, Source, random_law, vary_parameters
 from benchmarks.hunt_space_model import SpatialModel
 
 JOINTS = ("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "distance")
@@ -280,7 +280,7 @@ def _objectives(d: Drawing) -> None:
             keys["at"] = d.near(body, 0.3)
         choices.append({kind: keys})
     d.document["objectives"] = {
-        f"R{i}": {"response": choices[place], "over_time": str(d.pick(REDUCTIONS))}
+        f"R{i}": {"response": choices[place], "over_time": str(d.pick(REDUCTION_NAMES))}
         for i, place in enumerate(d.rng.permutation(len(choices))[:4].tolist())
     }
     _combine(d.document)

@@ -16,7 +16,6 @@ from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
 from mdstopo.general.extremes import FRACTION, STEP
 from mdstopo.general.general_driver import GeneralDriver
-from mdstopo.general.quadrature_breakpoints import INTEGRALS
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.starts.single_start import make_optimizer
 
@@ -152,7 +151,7 @@ def _sweeps(evaluator: Evaluator, load_case: str) -> list[str]:
     known = [
         (j, *driver.rows[j, r])
         for j, reduction in enumerate(driver.scene.reductions)
-        if reduction not in INTEGRALS
+        if not reduction.is_integral
         for r in range(int(driver.found[j]))
     ]
     times = [_seconds(_sweep(driver, count, known, rows)) for rows in ROWS]
@@ -170,7 +169,7 @@ def _sweep(driver: GeneralDriver, count: int, known: list[tuple[float, ...]], ro
     table = np.array([row[1:] for row in chosen])
     padded, out = np.zeros((rows, len(driver.padded))), np.zeros((rows, driver.gradients.shape[2]))
     return lambda: driver.entry.rows_vjp(
-        *driver.steps_arguments(count), which, table, driver.room, driver.room_ints, driver.strength, padded, out,
+        *driver.steps_arguments(count), which, table, driver.room, driver.room_ints, driver.member_state, padded, out,
         np.zeros((rows, 0)), driver.work,
     )  # fmt: skip
 

@@ -15,6 +15,7 @@ from mdstopo.case.design_space import DesignSpace
 from mdstopo.case.errors import CaseError
 from mdstopo.case.exchange import Side, exchange_ends
 from mdstopo.case.model import Case, Objective, ResponseRow, VolumeRow
+from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.responses import kind_of
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
@@ -329,9 +330,10 @@ def sign_of(objective: Objective) -> float:
 
 def competes(looked: Objective | ResponseRow, sign: float) -> bool:
     """Whether every competing peak of an objective or a constraint is a lower bound of sign times its value."""
-    if kind_of(looked.response).of_members and looked.over_time == "final":
+    reduction = REDUCTIONS[looked.over_time]
+    if reduction.at_end and kind_of(looked.response).of_members:
         return sign > 0.0  # members compete at the end, too
-    return looked.over_time in (("max", "max_abs") if sign > 0.0 else ("min",))
+    return reduction.is_largest if sign > 0.0 else reduction.is_smallest
 
 
 def _linear_rows(rows: list[VolumeRow], space: DesignSpace) -> LinearRows:

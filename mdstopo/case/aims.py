@@ -8,6 +8,7 @@ from dataclasses import field
 import numpy as np
 
 from mdstopo.case.arrays import Components, FloatArray, FrozenDict, read_only
+from mdstopo.case.over_time import DEFAULT_REDUCTION
 from mdstopo.case.value import Value, frozen
 from mdstopo.settings.optimizer_presets import DEFAULT_OPTIMIZER
 
@@ -51,11 +52,11 @@ class Response(Value):
 
 @frozen
 class Objective(Value):
-    """over_time: max | min | max_abs | mean | rms | integral | final; sense: minimize | maximize."""
+    """What is to be improved. over_time: the name of a record of `case.over_time`; sense: minimize | maximize."""
 
     name: str
     response: Response
-    over_time: str = "max"
+    over_time: str = DEFAULT_REDUCTION
     load_case: str = "default"
     sense: str = "minimize"
 

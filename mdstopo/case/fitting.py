@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mdstopo.case.aims import Response
+from mdstopo.case.losses import DEFAULT_LOSS
 from mdstopo.case.value import Value, frozen
 
 #: a column of a file: its name in the header line, or its place from 0
@@ -61,13 +62,13 @@ class Series(Value):
 class Fit(Value):
     """The section `fit`.
 
-    loss: how residuals count, linear | huber | soft_l1 | cauchy. starts: how many, the further ones random by `seed`.
-    confidence: that of the intervals.
+    loss: how residuals count, the name of a record of `case.losses`. starts: how many, the further ones random by
+    `seed`. confidence: that of the intervals.
     """
 
     numbers: tuple[FitNumber, ...]
     series: tuple[Series, ...]
-    loss: str = "linear"
+    loss: str = DEFAULT_LOSS
     starts: int = 1
     seed: int = 0
     confidence: float = 0.95

@@ -15,6 +15,7 @@ from mdstopo.case.design_variables import prices
 from mdstopo.case.expression_response import response_of
 from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
+from mdstopo.case.over_time import DEFAULT_REDUCTION
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.schema_case import SENSES
 from mdstopo.case.stages import check_powers, lowest, powers_of
@@ -182,7 +183,7 @@ def _response_row(
     case = load_case_of(fields, top, reading)
     if response is None or case is None or sense is None or not fields.good() or sense == "fraction":
         return None
-    return ResponseRow(response, fields["over_time"] or "max", case, fields[sense], sense)
+    return ResponseRow(response, fields["over_time"] or DEFAULT_REDUCTION, case, fields[sense], sense)
 
 
 def _volume_row(

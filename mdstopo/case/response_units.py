@@ -1,6 +1,7 @@
 """Units of responses, for axes and attributes."""
 
-from mdstopo.case.aims import Objective, Response
+from mdstopo.case.aims import Objective, Response, ResponseRow
+from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.responses import kind_of
 
 
@@ -9,10 +10,9 @@ def unit_of(response: Response) -> str:
     return response.unit or kind_of(response).unit
 
 
-def unit_of_value(objective: Objective) -> str:
+def unit_of_value(aim: Objective | ResponseRow) -> str:
     """The unit of a response reduced over time."""
-    unit = unit_of(objective.response)
-    return f"{unit} s" if objective.over_time == "integral" else unit
+    return REDUCTIONS[aim.over_time].unit_from(unit_of(aim.response))
 
 
 def words(response: Response) -> str:

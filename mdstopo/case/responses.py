@@ -15,6 +15,7 @@ from mdstopo.case.expression_response import expression_keys, make_expression
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import Ref, explained
 from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
+from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import ByShape, Key, Record
 from mdstopo.case.schema_frame import FRAME
@@ -272,6 +273,7 @@ def unit_stated(node: Node) -> str:
     words = [entry[1].text] if entry[1].kind == SCALAR else list(entry[1].entries)[:1]
     kind = RESPONSES.get(words[0]) if words else None
     over_time = node.entries.get("over_time")
-    integral = over_time is not None and over_time[1].kind == SCALAR and over_time[1].text == "integral"
+    stated = over_time[1].text if over_time is not None and over_time[1].kind == SCALAR else DEFAULT_REDUCTION
+    reduction = REDUCTIONS.get(stated)
     unit = "" if kind is None else kind.unit
-    return f"{unit} s" if unit and integral else unit
+    return reduction.unit_from(unit) if unit and reduction is not None else unit

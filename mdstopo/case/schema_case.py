@@ -27,6 +27,8 @@ from mdstopo.case.kinds import (
 )
 from mdstopo.case.nodes import SCALAR, Node
 from mdstopo.case.number_rows import FileName
+from mdstopo.case.over_time import DEFAULT_REDUCTION
+from mdstopo.case.over_time import names as reductions
 from mdstopo.case.reading import Reading
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.responses import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
@@ -203,18 +205,9 @@ DESIGN = Record(
     "`lower`, `upper` and `power` groups left out have the default.",
 )
 _RESPONSE = response_kinds(RESPONSES, IN_SPACE_ALONE, OF_OTHERS)
-_REDUCERS = explained(
-    {
-        "max": "its largest value, in continuous time; where it jumps, the larger one-sided limit",
-        "min": "its smallest value, in continuous time",
-        "max_abs": "the largest magnitude",
-        "mean": "the average over time",
-        "rms": "the root of the mean square",
-        "integral": "the integral over time",
-        "final": "the value at the end",
-    }
+_OVER_TIME = Key(
+    "over_time", explained(reductions()), "how the response over time becomes a number", default=DEFAULT_REDUCTION
 )
-_OVER_TIME = Key("over_time", _REDUCERS, "how the response over time becomes a number", default="max")
 LOAD_CASE_KEY = Key(
     "load_case",
     Ref("load case", also=("default",)),
@@ -266,7 +259,7 @@ CONSTRAINT = Record(
             "bounds the sum of alpha_i V_i over these members (Eq. 14)",
         ),
         Key("response", _RESPONSE, "what is bounded over time"),
-        Key("over_time", _OVER_TIME.kind, "how the response becomes a number", otherwise="max"),
+        Key("over_time", _OVER_TIME.kind, "how the response becomes a number", otherwise=DEFAULT_REDUCTION),
         LOAD_CASE_KEY,
         Key("limit", NUMBER, "at most this"),
         Key("fraction", Number(minimum=0, maximum=1), "of a volume: at most this share of sum V_i"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from mdstopo.case.kinds import NUMBER, POSITIVE, Kind, Number, Schema, explained
+from mdstopo.case.losses import DEFAULT_LOSS
+from mdstopo.case.losses import names as losses
 from mdstopo.case.nodes import SCALAR, Node
 from mdstopo.case.number_rows import FileName
 from mdstopo.case.reading import BAD, Reading, found
@@ -61,16 +63,6 @@ def _shift(name: str, what: str, unit: str) -> Key:
                default=0.0)  # fmt: skip
 
 
-_LOSSES = explained(
-    {
-        "linear": "least squares",
-        "huber": "squares up to one standard deviation, beyond it the absolute value",
-        "soft_l1": "a smooth one like huber",
-        "cauchy": "outliers count less and less",
-    }
-)
-
-
 def fit_record(response: Kind, load_case: Key) -> Record:
     """The section, in a plane or in space.
 
@@ -110,7 +102,7 @@ def fit_record(response: Kind, load_case: Key) -> Record:
                 required=True,
             ),
             Key("measured", Named(series, "measured series", 1), "what was measured, by name", required=True),
-            Key("loss", _LOSSES, "how residuals count", default="linear"),
+            Key("loss", explained(losses()), "how residuals count", default=DEFAULT_LOSS),
             Key("starts", Number(minimum=1, maximum=10**4, whole=True), "how many starts; the further ones are random",
                 default=1),
             Key("seed", Number(minimum=0, maximum=2**53, whole=True), "of the random starts", default=0),

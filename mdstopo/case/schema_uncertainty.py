@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind, Number, Schema, explained
+from mdstopo.case.kinds import NOT_NEGATIVE, Kind, Number, Schema, explained
 from mdstopo.case.measures import having
 from mdstopo.case.measures import names as measures
 from mdstopo.case.nodes import MAPPING, SEQUENCE, Node
-from mdstopo.case.number_rows import Rows
+from mdstopo.case.number_distributions import DISTRIBUTIONS
 from mdstopo.case.reading import BAD, Reading, found
 from mdstopo.case.records import ByName, Key, Named, Record
 from mdstopo.case.value import Value, frozen
@@ -56,50 +56,10 @@ class ByKey(Value):
         return {"type": "object", "additionalProperties": self.item.schema()}
 
 
-_DISTRIBUTIONS = {
-    "normal": (
-        Record(
-            "a normal distribution",
-            (
-                Key("mean", NUMBER, "mean", unit="the number's unit", otherwise="the number in the case"),
-                Key("deviation", POSITIVE, "standard deviation", required=True, unit="the number's unit"),
-                Key("from", NUMBER, "smaller values are left out", unit="the number's unit", otherwise="no limit"),
-                Key("to", NUMBER, "larger values are left out", unit="the number's unit", otherwise="no limit"),
-            ),
-            doc="The normal distribution; with `from` or `to` what is left of it between them.",
-        ),
-        "normal, perhaps truncated",
-    ),
-    "lognormal": (
-        Record(
-            "a lognormal distribution",
-            (
-                Key("mean", POSITIVE, "mean", unit="the number's unit", otherwise="the number in the case"),
-                Key("deviation", POSITIVE, "standard deviation", required=True, unit="the number's unit"),
-            ),
-            doc="A positive number whose logarithm is normal. Mean and deviation are the number's own.",
-        ),
-        "lognormal: positive, skewed",
-    ),
-    "uniform": (
-        Record(
-            "a uniform distribution",
-            (
-                Key("from", NUMBER, "the least value", required=True, unit="the number's unit"),
-                Key("to", NUMBER, "the largest value", required=True, unit="the number's unit"),
-            ),
-            doc="All values between two are equally likely.",
-        ),
-        "uniform between two values",
-    ),
-}
 _DISTRIBUTION = Record(
     "a distribution",
-    (
-        *(Key(name, record, doc) for name, (record, doc) in _DISTRIBUTIONS.items()),
-        Key("discrete", Rows(("value", "probability"), "free"), "a few values, each with its probability, of sum 1"),
-    ),
-    one_of=(("normal", "lognormal", "uniform", "discrete"),),
+    tuple(Key(kind.type, kind.keys, kind.doc) for kind in DISTRIBUTIONS.values()),
+    one_of=(tuple(DISTRIBUTIONS),),
     doc="How a number varies. Numbers vary independently of each other; what varies together is a scenario.",
 )
 _SCENARIO = Record(

@@ -11,23 +11,12 @@ from mdstopo.case.key_paths import led_to, number_at, stands, why_fixed
 from mdstopo.case.measures import MEASURES, OF_LIMITS, OF_OBJECTIVES, having
 from mdstopo.case.model import ResponseRow, VolumeRow
 from mdstopo.case.nodes import Node
+from mdstopo.case.number_distributions import DISTRIBUTIONS, ROUNDED, Distribution, scaled_to_one
 from mdstopo.case.overrides import WrongPathError, as_yaml, steps_of
 from mdstopo.case.reading import BAD, Fields, Reading, found, is_good
-from mdstopo.case.uncertain import (
-    Discrete,
-    Distribution,
-    Lognormal,
-    Measure,
-    Normal,
-    Scenario,
-    UncertainNumber,
-    Uncertainty,
-    Uniform,
-)
+from mdstopo.case.uncertain import Measure, Scenario, UncertainNumber, Uncertainty
 from mdstopo.case.words import inside, listed, number_text, shown
 
-#: by how much stated probabilities may miss the sum 1: thirds are written 0.333
-ROUNDED = 0.01
 #: points that an interval of confidence needs at least
 LEAST_VALIDATION = 30
 
@@ -122,44 +111,8 @@ def _refuse_fixed(path: str, steps: list[str], root: Node) -> None:
 
 
 def _distribution(keys: Fields, nominal: float, reading: Reading) -> Distribution | None:
-    (kind,) = keys.stated & {"normal", "lognormal", "uniform", "discrete"}
-    stated, path = keys[kind], inside(keys.path, kind)
-    if kind == "discrete":
-        values, shares = stated[:, 0].tolist(), stated[:, 1].tolist()
-        if min(shares) < 0.0 or abs(math.fsum(shares) - 1.0) > ROUNDED:
-            total = number_text(math.fsum(shares))
-            reading.mistake(path, f"found probabilities of sum {total}, allowed are such >= 0 of sum 1")
-            return None
-        return Discrete(tuple(values), _scaled(shares))
-    if kind == "uniform":
-        return Uniform(stated["from"], stated["to"]) if _rises(stated["from"], stated["to"], path, reading) else None
-    mean = nominal if stated["mean"] is None else stated["mean"]
-    if kind == "lognormal":
-        if mean <= 0.0:
-            reading.mistake(path, f"found the mean {number_text(mean)}, allowed is a number > 0")
-            return None
-        return Lognormal(mean, stated["deviation"])
-    low, high = stated["from"], stated["to"]
-    if low is not None and high is not None and not _rises(low, high, path, reading):
-        return None
-    made = Normal(mean, stated["deviation"], low, high)
-    reach = 6.0 * made.deviation
-    if (low is not None and low > mean + reach) or (high is not None and high < mean - reach):
-        reading.mistake(path, "next to nothing of the distribution is between `from` and `to`")
-        return None
-    return made
-
-
-def _rises(low: float, high: float, path: str, reading: Reading) -> bool:
-    if low < high:
-        return True
-    reading.mistake(inside(path, "to"), f"found {number_text(high)}, allowed is a number above {number_text(low)}")
-    return False
-
-
-def _scaled(shares: Sequence[float]) -> tuple[float, ...]:
-    total = math.fsum(shares)
-    return tuple(share / total for share in shares)
+    (kind,) = keys.stated & DISTRIBUTIONS.keys()
+    return DISTRIBUTIONS[kind].made(keys[kind], nominal, inside(keys.path, kind), reading)
 
 
 # Scenarios.
@@ -179,7 +132,7 @@ def _scenarios(fields: Fields, root: Node, numbers: set[str], reading: Reading) 
             total = number_text(math.fsum(shares))
             reading.mistake(path, f"found probabilities of sum {total}, allowed are such of sum 1")
     built = []
-    for (name, keys), share in zip(stated.items(), _scaled(shares) if shares else (), strict=True):
+    for (name, keys), share in zip(stated.items(), scaled_to_one(shares) if shares else (), strict=True):
         where = inside(keys.path, "set")
         values = {}
         for key, value in _items(keys["set"]):

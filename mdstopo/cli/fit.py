@@ -255,10 +255,11 @@ def _remarks(run: "FitRun") -> list[str]:
     if run.statistics is None:
         return []
     told = []
+    from mdstopo.case.losses import LOSSES
     from mdstopo.fit.least_squares import stated_deviations
 
     known = not math.isnan(float(stated_deviations(run.problem).max()))
-    if known and run.problem.fit.loss == "linear" and run.statistics.freedom > 0:
+    if known and not LOSSES[run.problem.fit.loss].is_robust and run.statistics.freedom > 0:
         from scipy.stats import chi2
 
         squares, freedom = run.statistics.chi_square, run.statistics.freedom

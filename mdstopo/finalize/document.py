@@ -20,6 +20,7 @@ from mdstopo.case.mesh_files import is_mesh
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
 from mdstopo.case.number_rows import rows_in
+from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reader import measured
 from mdstopo.case.reading import Reading
@@ -32,7 +33,6 @@ from mdstopo.finalize.sized_laws import Given, bound_of, differ, given, never_la
 from mdstopo.store.store_errors import StoreError
 
 Plain = dict[str, Any]
-_LARGEST = ("max", "max_abs")
 
 
 def content_of(case: Case) -> Plain:
@@ -319,7 +319,7 @@ def _constraints(
     for i, (entry, row) in enumerate(zip(stated, case.constraints, strict=True)):
         if not isinstance(row, VolumeRow):
             versions = _looking(entry, groups)
-            if len(versions) == 1 or (versions and row.sense == "limit" and row.over_time in _LARGEST):
+            if len(versions) == 1 or (versions and row.sense == "limit" and REDUCTIONS[row.over_time].is_largest):
                 found += versions
             else:
                 told.append(f"constraints[{i}] is left out: {_reason(versions)}")

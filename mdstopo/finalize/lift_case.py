@@ -16,6 +16,7 @@ from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.number_rows import Signals
+from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.overrides import node_of, steps_of
 from mdstopo.case.reading import Reading
 from mdstopo.case.responses import RESPONSES
@@ -25,8 +26,6 @@ from mdstopo.case.words import inside, shown
 from mdstopo.case.yaml_text import text_of
 from mdstopo.finalize.document import Plain, content_of
 
-#: what `over_time` makes of an angle's norm is what it makes of the angle
-_UNSIGNED = ("max_abs", "rms")
 _ANGLES = {
     "angle": "rotation",
     "angular_velocity": "angular_velocity",
@@ -321,7 +320,8 @@ class _Lift:
         if not isinstance(response, Mapping):
             return old
         ((word, keys),) = response.items()
-        return {**old, "response": self.response(word, keys, old.get("over_time", "max"), inside(path, "response"))}
+        over_time = old.get("over_time", DEFAULT_REDUCTION)
+        return {**old, "response": self.response(word, keys, over_time, inside(path, "response"))}
 
     def response(self, word: str, keys: Plain, over_time: str, path: str) -> Plain:
         """A response; seen from ground in a tilted plane only what has no direction there."""
@@ -336,7 +336,7 @@ class _Lift:
                 words = "it is not 0 at the start, from which a rotation in space counts"
                 self.refuse(here, words)
             component = "norm" if from_ground else "z"
-            if from_ground and over_time not in _UNSIGNED:
+            if from_ground and not REDUCTIONS[over_time].ignores_sign:
                 words = f"in a tilted plane only its size is a component, and over_time {over_time} needs its sign"
                 self.refuse(here, words)
             return {_ANGLES[word]: {**keys, "component": component}}

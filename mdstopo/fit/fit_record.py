@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.losses import DEFAULT_LOSS
 from mdstopo.case.model import Case
 from mdstopo.case.response_units import unit_of, words
 from mdstopo.engine import Evaluator
@@ -221,7 +222,7 @@ def content(view: ResultView) -> dict[str, Any]:
             "title": view.title,
             "status": view.status,
             "reason": view.reason,
-            "loss": view.settings.get("loss", "linear"),
+            "loss": view.settings.get("loss", DEFAULT_LOSS),
             "confidence": view.settings.get("confidence", 0.95),
             **{
                 key: arrays.get(key)

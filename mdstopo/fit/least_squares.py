@@ -11,7 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.losses import LOSSES
 from mdstopo.fit.fit_problem import FitProblem
+from mdstopo.fit.loss_functions import for_scipy, loss
 from mdstopo.fit.predictions import MotionError
 
 #: relative change of the cost, of the estimates, and the slope at which a fit has come to its end
@@ -121,7 +123,7 @@ def fitted(
             deviation[part] = deviation_of(problem, found.misfit[part], problem.measured[s].y)
         found = replace(found, deviation=deviation.copy())
         # one series alone, or all of equal deviations: the deviation does not change where the minimum is
-        alone = len(problem.parts) == 1 and problem.fit.loss == "linear"
+        alone = len(problem.parts) == 1 and not LOSSES[problem.fit.loss].is_robust
         change = float(np.max(np.abs(deviation / before - 1.0)))
         if cost == COST and (alone or change < SETTLED):
             break
@@ -137,10 +139,10 @@ def fitted(
 def deviation_of(problem: FitProblem, misfit: FloatArray, y: FloatArray) -> float:
     """The standard deviation of a series from its residuals; with a robust loss from the median of their magnitudes."""
     share = max(1.0 - len(problem.names) / problem.count, 1.0 / problem.count)
-    if problem.fit.loss == "linear":
-        size = float(np.sqrt(np.mean(misfit**2) / share))
-    else:
+    if LOSSES[problem.fit.loss].is_robust:
         size = float(np.median(np.abs(misfit)) / (MEDIAN * np.sqrt(share)))
+    else:
+        size = float(np.sqrt(np.mean(misfit**2) / share))
     return max(size, LEAST_DEVIATION * float(np.abs(y).max()), np.finfo(float).tiny)
 
 
@@ -196,7 +198,7 @@ def minimum(
             return _at(problem, start, misfit, deviation, "converged", "nothing is free", evaluations)
         found = least_squares(
             residuals, np.clip((start[free] - low) / width, 0.0, 1.0), jacobian, (0.0, 1.0), method="trf",
-            ftol=precision, xtol=STEP, gtol=SLOPE, x_scale="jac", loss=problem.fit.loss, max_nfev=MOST,
+            ftol=precision, xtol=STEP, gtol=SLOPE, x_scale="jac", loss=for_scipy(problem.fit.loss), max_nfev=MOST,
         )  # fmt: skip
     except MotionError as error:
         nan = np.full(problem.count, np.nan)
@@ -229,20 +231,6 @@ def _at(
 def _cost(problem: FitProblem, residuals: FloatArray) -> float:
     """Half the sum of what the loss makes of the squares of residuals."""
     return 0.5 * float(np.sum(loss(problem.fit.loss, residuals)[0]))
-
-
-def loss(name: str, r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """rho(r) and half its first and second derivatives by r (n,): what a residual counts, pulls, and bends."""
-    z = r**2
-    if name == "linear":
-        return z, r, np.ones_like(r)
-    if name == "huber":
-        near = np.abs(r) <= 1.0
-        return np.where(near, z, 2.0 * np.abs(r) - 1.0), np.clip(r, -1.0, 1.0), near.astype(np.float64)
-    if name == "soft_l1":
-        root = np.sqrt(1.0 + z)
-        return 2.0 * (root - 1.0), r / root, 1.0 / root**3
-    return np.log1p(z), r / (1.0 + z), (1.0 - z) / (1.0 + z) ** 2
 
 
 def _spread(y: FloatArray) -> float:

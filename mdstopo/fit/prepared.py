@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case, MemberGroup, Objective, Variable
+from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.reader import read_case
 from mdstopo.case.words import inside
 from mdstopo.scene.springs_model import FloatArray
@@ -36,12 +37,13 @@ def case_at(case: Case, keys: Sequence[str], x: FloatArray) -> Case:
 def prepared(case: Case) -> Case:
     """The case with the measured responses alone, with its design variables at their initial values."""
     assert case.fit is not None
-    # the reduction is never taken: one that only the general kernels know has the case be theirs
-    looked = tuple(Objective(each.name, each.response, "max_abs", each.load_case) for each in case.fit.series)
+    # no reduction is taken: one that only the general kernels have makes the case one for these
+    general = next(kind.name for kind in REDUCTIONS.values() if not kind.springs)
+    objectives = tuple(Objective(each.name, each.response, general, each.load_case) for each in case.fit.series)
     return replace(
         case,
         members=tuple(_settled(case, group) for group in case.members),
-        objectives=looked,
+        objectives=objectives,
         combine=None,
         constraints=(),
         uncertainty=None,

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.losses import LOSSES
 from mdstopo.fit.fit_problem import FitProblem
-from mdstopo.fit.least_squares import Minimum, loss, stated_deviations
+from mdstopo.fit.least_squares import Minimum, stated_deviations
+from mdstopo.fit.loss_functions import loss
 
 #: singular values below this share of the largest are none
 NOTHING = 1e-6
@@ -59,12 +61,12 @@ def statistics(problem: FitProblem, found: Minimum) -> Statistics:
     width = problem.upper - problem.lower
     at_bound = _bounds(problem, found)
     free = np.flatnonzero(at_bound == 0)
-    _, pull, bend = loss(problem.fit.loss, found.residuals)
+    _, influence, slope = loss(problem.fit.loss, found.residuals)
     scaled = found.jacobian[:, free] * width[free]
     directions, known = _directions(problem, scaled, free)
-    middle = _inverse(scaled.T @ (bend[:, None] * scaled), known)
-    if problem.fit.loss != "linear":
-        middle = middle @ (scaled.T @ (pull[:, None] ** 2 * scaled)) @ middle
+    middle = _inverse(scaled.T @ (slope[:, None] * scaled), known)
+    if LOSSES[problem.fit.loss].is_robust:
+        middle = middle @ (scaled.T @ (influence[:, None] ** 2 * scaled)) @ middle
     # what a direction without any value takes part in is not known
     lost = np.sum(known**2, axis=1) < 1.0 - TAKES_PART**2 if len(free) else np.zeros(0, dtype=bool)
     covariance = np.full((p, p), np.nan)
@@ -96,8 +98,8 @@ def quantile(problem: FitProblem) -> float:
 def _bounds(problem: FitProblem, found: Minimum) -> FloatArray:
     """(p,) which estimates are held by a bound, from which the cost falls no more: -1 lower, 1 upper, else 0."""
     near = AT_BOUND * (problem.upper - problem.lower)
-    _, pull, _ = loss(problem.fit.loss, found.residuals)
-    slope = found.jacobian.T @ pull
+    _, influence, _ = loss(problem.fit.loss, found.residuals)
+    slope = found.jacobian.T @ influence
     at_bound = np.zeros(len(found.x))
     at_bound[(found.x - problem.lower <= near) & (slope > 0.0)] = -1.0
     at_bound[(problem.upper - found.x <= near) & (slope < 0.0)] = 1.0

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mdstopo.case.over_time import ReductionKind
 from mdstopo.general.extremes import FRACTIONS, row_of
 from mdstopo.general.general_model import COUNT, GROUP, OFFSET, SUBJECT
 from mdstopo.general.general_responses import MEMBER_FORCE
@@ -27,9 +28,9 @@ AT_ONCE = 2**21
 BESIDE = 0.02
 
 
-def compete(kind: int, reduction: str) -> bool:
+def compete(kind: int, reduction: ReductionKind) -> bool:
     """Whether the members behind a response of this kind compete for its extreme, with this reduction."""
-    return kind == MEMBER_FORCE and reduction in ("max", "max_abs", "final")
+    return kind == MEMBER_FORCE and (reduction.is_largest or reduction.at_end)
 
 
 def members_peaks(

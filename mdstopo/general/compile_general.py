@@ -8,6 +8,7 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, LoadCase, MemberGroup, Response, ResponseRow
+from mdstopo.case.over_time import REDUCTIONS, ReductionKind
 from mdstopo.case.responses import kind_of
 from mdstopo.compiler.threads import allowed
 from mdstopo.general import general_responses
@@ -59,7 +60,7 @@ class GeneralScene:
     skipped: tuple[str, ...]
     redundant: tuple[str, ...]
     responses: tuple[Response, ...]
-    reductions: tuple[str, ...]
+    reductions: tuple[ReductionKind, ...]
     kinematics: Kinematics
     contacts: tuple[str, ...] = ()
 
@@ -74,12 +75,12 @@ class GeneralScene:
         return int(self.model.free.sum()) - int(self.model.size[0])
 
 
-def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[str, ...]]:
+def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[ReductionKind, ...]]:
     """Responses and reductions of a load case: its objectives, then its constraints, each in the case's order."""
     found = [(o.response, o.over_time) for o in case.objectives if o.load_case == load_case]
     rows = [row for row in case.constraints if isinstance(row, ResponseRow) and row.load_case == load_case]
     found += [(row.response, row.over_time) for row in rows]
-    return tuple(r for r, _ in found), tuple(o for _, o in found)
+    return tuple(r for r, _ in found), tuple(REDUCTIONS[o] for _, o in found)
 
 
 def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
@@ -393,11 +394,11 @@ def _responses(
     return np.array(codes, dtype=np.int64).reshape(-1, 6), par, np.array(data, dtype=np.float64)
 
 
-def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, ...]) -> bool:
+def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[ReductionKind, ...]) -> bool:
     """Whether anything depends on velocity: then the steps' stages need velocities that are right."""
     looks = any(
-        over_time in ("mean", "rms", "integral") and kind_of(each).depends_on_rate
-        for response, over_time in zip(responses, reductions, strict=True)
+        reduction.is_integral and kind_of(each).depends_on_rate
+        for response, reduction in zip(responses, reductions, strict=True)
         for each in response.parts
     )
     return has_damping(case) or adds_damping(case) or looks or bool(case.joints)

@@ -9,6 +9,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.memory import most_floats, room_factor
 from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.case.over_time import ReductionKind
 from mdstopo.case.responses import kind_of
 from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.evaluation import USUAL, Rows, Shape
@@ -27,9 +28,10 @@ from mdstopo.general.extremes import (
 )
 from mdstopo.general.general_model import COUNT, GROUP, INERTER, JOINT_FIRST, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.general_responses import switches_of
+from mdstopo.general.integral_reductions import value_of_integral
 from mdstopo.general.kinks import landed
 from mdstopo.general.minima import Pieces, minima
-from mdstopo.general.quadrature_breakpoints import ROUNDS, quadrature_breakpoints, reduced
+from mdstopo.general.quadrature_breakpoints import ROUNDS, quadrature_breakpoints
 from mdstopo.general.ready import Ready
 from mdstopo.general.response_shapes import shape_of
 from mdstopo.general.row_gradients import BLOCK, RowGradients
@@ -56,7 +58,6 @@ from mdstopo.scene.diagnosis import fastest_body, member_in_words
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.scene.vibration_modes import Modes
-from mdstopo.sensitivity.reductions import INTEGRALS
 from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.status import Status
 
@@ -66,10 +67,6 @@ if TYPE_CHECKING:
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
-#: reductions that take the peaks of g, and whether those of -g too; minima are found in `minima`
-PEAKS = {"max": False, "max_abs": True}
-#: of which peaks: those of g, of -g
-SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -88,7 +85,7 @@ class GeneralDriver:
         self._placing = Placing(case, scene.load_case, model) if case.variables else None
         self._packed = self.ints, self.floats = self.pack(model)
         #: whether a response is integrated over time
-        self._integrated = any(name in INTEGRALS for name in scene.reductions)
+        self._integrated = any(reduction.is_integral for reduction in scene.reductions)
         self.settings = np.array(
             [options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS, float(self._integrated)]
         )
@@ -103,7 +100,9 @@ class GeneralDriver:
         self._swept = self.padded.reshape(1, -1)
         self.found = np.zeros(count, dtype=np.int64)
         #: how the value of every response is formed: plain, absolute, a norm (`evaluation.Peak.shape`)
-        self.shapes: tuple[Shape, ...] = tuple(shape_of(model, j, name) for j, name in enumerate(scene.reductions))
+        self.shapes: tuple[Shape, ...] = tuple(
+            shape_of(model, j, reduction) for j, reduction in enumerate(scene.reductions)
+        )
         self.where = np.full(3, -1, dtype=np.int64)
         #: steps of the last run
         self.count = 0
@@ -259,8 +258,8 @@ class GeneralDriver:
                 differentiated = self._find_peaks_with_gradients(count, window)
             else:
                 differentiated = False
-                for j, name in enumerate(self.scene.reductions):
-                    self._reduce_response(j, name, count, gradient, window)
+                for j, reduction in enumerate(self.scene.reductions):
+                    self._reduce_response(j, reduction, count, gradient, window)
             if gradient and not differentiated:
                 self._row_gradients(count, across)
             status, message = self._without_value(gradient)
@@ -289,7 +288,7 @@ class GeneralDriver:
         bodies, found = self.scene.bodies, {}
         for response, reduction in zip(self.scene.responses, self.scene.reductions, strict=True):
             for each in response.parts:
-                if kind_of(each).jumps and reduction != "final":
+                if kind_of(each).jumps and not reduction.at_end:
                     pair = each.relative_to or GROUND, each.body or GROUND
                     found[pair] = np.array([bodies.index(name) for name in pair])
         return found
@@ -332,39 +331,39 @@ class GeneralDriver:
                     return int(member)
         return -1
 
-    def _reduce_response(self, j: int, reduction: str, count: int, gradient: bool, window: float) -> None:
+    def _reduce_response(self, j: int, reduction: ReductionKind, count: int, gradient: bool, window: float) -> None:
         """Rows of response j, reduced over time; of an integral the gradient, too."""
         rows = self.rows[j]
-        if reduction in INTEGRALS:
+        if reduction.is_integral:
             t = self.states()[0]
-            total = self._integral_with_gradient(j, INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
-            value, slope = reduced(reduction, total, float(t[count] - t[0]))
+            total = self._integral_with_gradient(j, reduction.power, count, gradient, self.gradients[j, 0])
+            value, slope = value_of_integral(reduction, total, float(t[count] - t[0]))
             rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
             self.gradients[j, 0] *= slope
             self.found[j] = 1
             if switches_of(self.scene.model, j):
-                self.jumps[j] = switched_integral(self, j, Pieces(self, j, t[: count + 1].copy()), reduction, slope)
+                pieces = Pieces(self, j, t[: count + 1].copy())
+                self.jumps[j] = switched_integral(self, j, pieces, reduction.is_squared, slope)
             return
 
         competing = compete(self.scene.model.response[j, 0], reduction)
-        switched = switches_of(self.scene.model, j) > 0 and reduction in SIGNS
-        if not competing and not switched and reduction in PEAKS:
-            found = self._peaks_of_steps(j, PEAKS[reduction], count, window)
+        switched = switches_of(self.scene.model, j) > 0 and not reduction.at_end
+        if not competing and not switched and reduction.is_largest:
+            found = self._peaks_of_steps(j, reduction.is_magnitude, count, window)
         else:
             t = self.states()[0][: count + 1].copy()
             if switched:
-                signs = SIGNS[reduction]
-                candidates = switched_peaks(self, j, Pieces(self, j, t), signs, window)
+                candidates = switched_peaks(self, j, Pieces(self, j, t), reduction.signs, window)
             elif competing:
-                candidates = members_peaks(self, j, t, reduction == "final", window, len(rows))
-            elif reduction == "final":
+                candidates = members_peaks(self, j, t, reduction.at_end, window, len(rows))
+            elif reduction.at_end:
                 value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
                 candidates = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
             else:
                 candidates = list(minima(self, j, t))
             found = self.entry.rank_rows(np.array(candidates), window, float(t[-1] - t[0]), rows)
         self.found[j] = found
-        if reduction == "max_abs":
+        if reduction.is_magnitude:
             rows[:found, VALUE] *= rows[:found, SIGN]
 
     @cached_property
@@ -374,20 +373,20 @@ class GeneralDriver:
             return False
         (reduction,), model = self.scene.reductions, self.scene.model
         plain = not compete(model.response[0, 0], reduction) and switches_of(model, 0) == 0
-        return reduction in PEAKS and plain and self.rows.shape[1] * len(self.padded) <= BLOCK
+        return reduction.is_largest and plain and self.rows.shape[1] * len(self.padded) <= BLOCK
 
     def _find_peaks_with_gradients(self, count: int, window: float) -> bool:
         """Rows of the only response, with their gradients; False where these are still to be found."""
         (reduction,) = self.scene.reductions
         found, differentiated = self.ready("peaks_vjp", self.entry.peaks_vjp, *self._plain_arguments(count, window))
         self.found[0] = found
-        if reduction == "max_abs":
+        if reduction.is_magnitude:
             self.rows[0, :found, VALUE] *= self.rows[0, :found, SIGN]
         return bool(differentiated)
 
     def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:
         """All arguments of `peaks_vjp`."""
-        both = PEAKS[self.scene.reductions[0]]
+        both = self.scene.reductions[0].is_magnitude
         return (
             *self.steps_arguments(count), 0, both, self.steps_are_fine, window, self.room, self.room_ints,
             self.member_state, self._swept, self._rows_of[0], self._gradients_of[0], self.work,
@@ -535,13 +534,13 @@ class GeneralDriver:
 
         A process that does so beside one that compiles the steps takes half of the work from it.
         """
-        entry, kinds = self.entry, set(self.scene.reductions)
+        entry, reductions = self.entry, self.scene.reductions
         if self._plain_peaks:
             entry.peaks_vjp.compile(*self._plain_arguments(0, 0.0))
             return
-        if kinds - INTEGRALS.keys():
+        if not all(reduction.is_integral for reduction in reductions):
             self._row_gradients.compile()
-        if kinds & PEAKS.keys():
+        if any(reduction.is_largest for reduction in reductions):
             entry.peaks_of_steps.compile(*self._history_arguments(0), 0, True, True, 0.0, self._rows_of[0], self.work)
 
     def _history_arguments(self, count: int) -> tuple[Any, ...]:

@@ -23,7 +23,6 @@ from mdstopo.scene.bodies import stands_as
 from mdstopo.scene.origin import starting_places
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.sensitivity.candidate_pass import CandidatePass
-from mdstopo.sensitivity.reductions import INTEGRALS
 from mdstopo.sensitivity.springs_candidate_prices import TILE_NUMBERS
 
 if TYPE_CHECKING:
@@ -31,8 +30,6 @@ if TYPE_CHECKING:
 
 #: the highest power of time that virtual changes within a step have, and stages from which on they have it
 HIGHEST, MANY = 3, 8
-#: which square an integral is of, by `INTEGRALS`
-SQUARED = 2
 
 
 class ScenePricingStates(NamedTuple):
@@ -117,9 +114,9 @@ def _rows_of(driver: "GeneralDriver", factor: FloatArray) -> _Rows:
     ]
     rows = [each for each in rows if each[1] != 0.0]
     integrals = [
-        (j, INTEGRALS[name] == SQUARED, factor[j, 0] * driver.rows[j, 0, RATE])
-        for j, name in enumerate(driver.scene.reductions)
-        if name in INTEGRALS and factor[j, 0] != 0.0
+        (j, reduction.is_squared, factor[j, 0] * driver.rows[j, 0, RATE])
+        for j, reduction in enumerate(driver.scene.reductions)
+        if reduction.is_integral and factor[j, 0] != 0.0
     ]
     return _Rows(
         np.array([[row.response, 0] for row, _ in rows], dtype=np.int64).reshape(-1, 2),

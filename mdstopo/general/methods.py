@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mdstopo.case.over_time import ReductionKind
 from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.general.extremes import RATE, SIGN, parts, row_of
-from mdstopo.general.quadrature_breakpoints import reduced
+from mdstopo.general.integral_reductions import value_of_integral
 from mdstopo.integrators.scene_driver import ResponseResult
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.springs_model import FloatArray
-from mdstopo.sensitivity.reductions import INTEGRALS
 from mdstopo.sensitivity.springs_constant_load import DROPPED
 from mdstopo.sensitivity.springs_methods import FALLBACK
 from mdstopo.status import Status
@@ -93,7 +93,7 @@ def _carried(
                         return by_direct(driver, alpha, looked, across)[0], message
                     _add_since_settled(driver, j, part, is_across, integrated, count, own)
                     out += factor * own
-            if reduction == "max_abs":
+            if reduction.is_magnitude:
                 gradients[j, r] *= rows[j, r, SIGN]
     return gradients, message
 
@@ -115,21 +115,23 @@ def _add_since_settled(
     driver.start.vjp(pulled, out)
 
 
-def _summands(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str) -> list[tuple[int, float, FloatArray]]:
+def _summands(
+    driver: "GeneralDriver", j: int, row: FloatArray, reduction: ReductionKind
+) -> list[tuple[int, float, FloatArray]]:
     """What a row's derivative is put together from: 1 or 2 for an integral (of the square), factors, and rows.
 
     driver: with a finished run. j, row, reduction: the response, its row, how it is reduced over time.
     """
-    integral = INTEGRALS.get(reduction, 0)
-    found = [(integral, row.item(RATE) * share if integral else share, part) for share, part in parts(row)]
+    slope = row.item(RATE) if reduction.is_integral else 1.0
+    found = [(reduction.power, slope * share, part) for share, part in parts(row)]
     return found + [(0, factor, at) for factor, at in driver.jumps.get(j, [])]
 
 
-def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, count: int) -> FloatArray:
+def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: ReductionKind, count: int) -> FloatArray:
     """A row's gradient (N,) by constant dynamic loading; an integral's at the steps' ends, by the trapezoidal rule."""
     t = driver.states()[0][: count + 1].copy()
-    if reduction not in INTEGRALS:
-        sign = row[SIGN] if reduction == "max_abs" else 1.0
+    if not reduction.is_integral:
+        sign = row[SIGN] if reduction.is_magnitude else 1.0
         gradient = np.zeros(len(driver._alpha))
         for share, part in parts(row):
             gradient += sign * share * _held_at(driver, j, part, count)
@@ -141,10 +143,10 @@ def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, coun
         seen = driver.sample_response(j, place, True, count)[2][0]
         weight = 0.5 * (t[min(k + 1, count)] - t[max(k - 1, 0)])
         at = row_of(t[k], seen[0], place[0, 0], place[0, 1], seen[1], 1.0, seen[2])
-        factor = 2.0 * seen[0] if reduction == "rms" else 1.0
-        values[k] = weight * (seen[0] ** 2 if reduction == "rms" else seen[0])
+        factor = 2.0 * seen[0] if reduction.is_squared else 1.0
+        values[k] = weight * (seen[0] ** 2 if reduction.is_squared else seen[0])
         total += weight * factor * _held_at(driver, j, at, count)
-    total *= reduced(reduction, float(values.sum()), float(t[-1] - t[0]))[1]
+    total *= value_of_integral(reduction, float(values.sum()), float(t[-1] - t[0]))[1]
     for factor, at in driver.jumps.get(j, []):
         total += factor * _held_at(driver, j, at, count)
     return total

@@ -9,7 +9,6 @@ them is landed on; since steps are chosen anew in between, that is checked once 
 stay.
 """
 
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -22,7 +21,6 @@ from mdstopo.general.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-from mdstopo.sensitivity.reductions import INTEGRALS
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
@@ -45,19 +43,19 @@ NOUGHT = 1e-12
 APART = 1e-10
 
 #: places (K, 2), and between which two ends each is (K,) -> values (K,)
-Look = Callable[[FloatArray, IndexArray], FloatArray]
+Integrand = Callable[[FloatArray, IndexArray], FloatArray]
 
 
 def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
     """Times at which steps are to end, beside `driver.quadrature_breakpoints`, from the `count` steps of its last
     run."""
     model, found = driver.scene.model, list[float]()
-    looked = [(j, name) for j, name in enumerate(driver.scene.reductions) if name in INTEGRALS]
-    if not looked:
+    integrals = [(j, kind.is_squared) for j, kind in enumerate(driver.scene.reductions) if kind.is_integral]
+    if not integrals:
         return found
     t = driver.states()[0][: count + 1].copy()
     if not driver.quadrature_breakpoints:
-        for j, _ in looked:
+        for j, _ in integrals:
             if has_kinks(model, j) or switches_of(model, j):
                 found += kinks(driver, j, t)
     if not driver.method.kind.adaptive or driver.settings[2] > 0.0:
@@ -65,15 +63,14 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
     ends = np.unique(np.concatenate([t, found, driver.quadrature_breakpoints]))
     ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]
     rule = _rule(driver, count)
-    for j, name in looked:
-        look = _looked(driver, j, t, ends, INTEGRALS[name] == 2)
-
+    for j, square in integrals:
+        integrand = _integrand(driver, j, t, ends, square)
         nothing = _rounding(driver, j, float(t[-1] - t[0]))
-        nothing = nothing * nothing if INTEGRALS[name] == 2 else nothing
+        nothing = nothing * nothing if square else nothing
         found += halves(
             t,
             ends,
-            look,
+            integrand,
             rule,
             SHARE * float(driver.settings[0]),
             nothing * float(t[-1] - t[0]),
@@ -82,7 +79,7 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
     return found
 
 
-def _looked(driver: "GeneralDriver", j: int, t: FloatArray, ends: FloatArray, square: bool) -> Look:
+def _integrand(driver: "GeneralDriver", j: int, t: FloatArray, ends: FloatArray, square: bool) -> Integrand:
     """Values of response j; those of an expression with switches go on between two `ends` as they are in their middle.
 
     driver: with a finished run. t (m + 1,): its steps' times (s).
@@ -140,7 +137,7 @@ def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
 def halves(
     t: FloatArray,
     ends: FloatArray,
-    look: Look,
+    integrand: Integrand,
     rule: FloatArray,
     tolerance: float,
     nothing: float = 0.0,
@@ -150,7 +147,7 @@ def halves(
 
     t (m + 1,): ends of the steps (s), all of them among `ends`.
     ends (k + 1,): times at which steps end or will have to end (s).
-    look: values of the integrand (K,) at places (K, 2), steps and fractions of them, each between two ends (K,).
+    integrand: its values (K,) at places (K, 2), steps and fractions of them, each between two ends (K,).
     rule (2, s): nodes and weights of the rule on (0, 1).
     tolerance: how far the rule may differ from the Gauss-Legendre sum, relative to the whole integral.
     nothing: up to this the integral counts as zero, and no interval is halved.
@@ -168,7 +165,7 @@ def halves(
         times = low[:, None] + width[:, None] * places
         fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
         at = np.stack([np.broadcast_to(step[:, None], fraction.shape), fraction], axis=-1)
-        value = look(at.reshape(-1, 2), np.repeat(within, len(places))).reshape(fraction.shape)
+        value = integrand(at.reshape(-1, 2), np.repeat(within, len(places))).reshape(fraction.shape)
         sums = width * np.einsum("ij,j->i", value[:, :count], rule[1])
         better = 0.5 * width * np.einsum("ij,j->i", value[:, count:], weights)
         if np.isnan(whole):
@@ -188,13 +185,3 @@ def halves(
         low, width = np.concatenate([low[bad], low[bad] + half]), np.concatenate([half, half])
         step, within = np.tile(step[bad], 2), np.tile(within[bad], 2)
     return found
-
-
-def reduced(reduction: str, total: float, span: float) -> tuple[float, float]:
-    """Mean, integral or rms from the integral over time (of the square), and its derivative by that."""
-    if reduction == "integral":
-        return total, 1.0
-    if reduction == "mean":
-        return total / span, 1.0 / span
-    value = math.sqrt(max(total / span, 0.0))
-    return value, 0.5 / (span * value) if value > 0.0 else 0.0

@@ -6,7 +6,6 @@ import numpy as np
 
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, parts
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-from mdstopo.sensitivity.reductions import INTEGRALS
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
@@ -47,7 +46,7 @@ def wanted_rows(driver: "GeneralDriver", across: bool) -> list[WantedRow]:
     wanted = [
         WantedRow(j, r, is_across, share, part)
         for j, reduction in enumerate(driver.scene.reductions)
-        if reduction not in INTEGRALS
+        if not reduction.is_integral
         for r in range(driver.found.item(j))
         for share, part in parts(driver.rows[j, r])
         for is_across in range(2 if across and driver.shapes[j] == "norm" else 1)
@@ -60,7 +59,7 @@ def wanted_rows(driver: "GeneralDriver", across: bool) -> list[WantedRow]:
 
 def sign_of(driver: "GeneralDriver", j: int, r: int) -> float:
     """The sign with which the derivative of the quantity in row r stands in that of response j."""
-    return driver.rows.item(j, r, SIGN) if driver.scene.reductions[j] == "max_abs" else 1.0
+    return driver.rows.item(j, r, SIGN) if driver.scene.reductions[j].is_magnitude else 1.0
 
 
 class RowGradients:
@@ -91,13 +90,13 @@ class RowGradients:
                     driver.start.vjp(start, own)
                 if is_across and across is not None:
                     across[j, r] += share * own
-                elif (j, r) in begun or driver.scene.reductions[j] in INTEGRALS:
+                elif (j, r) in begun or driver.scene.reductions[j].is_integral:
                     driver.gradients[j, r] += sign_of(driver, j, r) * share * own
                 else:
                     np.multiply(own, sign_of(driver, j, r) * share, out=driver.gradients[j, r])
                     begun.add((j, r))
         for j, reduction in enumerate(driver.scene.reductions):
-            if reduction not in INTEGRALS:
+            if not reduction.is_integral:
                 for r in range(driver.found.item(j)):
                     if (j, r) not in begun:  # it has no parts
                         driver.gradients[j, r] = 0.0

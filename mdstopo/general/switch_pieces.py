@@ -97,16 +97,15 @@ def switched_peaks(
 
 
 def switched_integral(
-    driver: "GeneralDriver", j: int, pieces: "Pieces", reduction: str, slope: float
+    driver: "GeneralDriver", j: int, pieces: "Pieces", square: bool, slope: float
 ) -> list[tuple[float, FloatArray]]:
     """What jumps of expression j do to its integral over time: rows whose derivatives are added, with their factors.
 
     driver: with a finished run. j: the response.
     pieces: its pieces.
-    reduction, slope: how the integral becomes a value (rms: that of the square), and the value's derivative by it.
+    square: whether the integral is that of its square. slope: the derivative by it, of the value that it becomes.
     """
     found = []
-    square = reduction == "rms"
     largest = float(np.abs(pieces.samples[:, :, 0]).max())
     for b in range(1, len(pieces.leads)):
         if pieces.leads[b].member == pieces.leads[b - 1].member or pieces.is_stated(b):

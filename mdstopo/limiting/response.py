@@ -9,6 +9,7 @@ import numpy as np
 
 from mdstopo.case.aims import Objective, Response, ResponseRow
 from mdstopo.case.model import GROUND
+from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.response_units import words
 from mdstopo.case.responses import kind_of
 from mdstopo.limiting.known import Cubics, Floats
@@ -56,26 +57,27 @@ def objective_row(system: System, objective: Objective) -> tuple[Bounded, float]
 
     Raises NoBoundError.
     """
-    response, over, sense = objective.response, objective.over_time, objective.sense
+    response, over, minimized = objective.response, REDUCTIONS[objective.over_time], objective.sense == "minimize"
     _translates(response)
     row = _row(system, response)
     _centred(system, response)
     norm = response.component == "norm"
-    sign = 1.0 if sense == "minimize" else -1.0
-    if over in ("mean", "rms", "integral"):
-        raise NoBoundError(f"{over} over time is no peak: only peaks and final values are bounded")
-    if over == "final" and row.order == 2:
+    sign = 1.0 if minimized else -1.0
+    if over.is_integral:
+        raise NoBoundError(f"{over.name} over time is no peak: only peaks and final values are bounded")
+    if over.at_end and row.order == 2:
         raise NoBoundError("the acceleration at one instant can be anything: only peaks of it are bounded")
-    if over == "final":
-        convex = not norm or sense == "minimize"
-    elif norm or over == "max_abs":
-        convex = over in ("max", "max_abs") and sense == "minimize"
+    if over.at_end:
+        convex = not norm or minimized
+    elif norm or over.is_magnitude:
+        convex = over.is_largest and minimized
     else:
-        convex = (over, sense) in (("max", "minimize"), ("min", "maximize"))
+        convex = over.is_largest if minimized else over.is_smallest
     if not convex:
-        raise NoBoundError(f"{sense} the {over} of {words(response)} is no convex problem, so no bound is known")
-    row = replace(row, final=over == "final")
-    if norm or over == "max_abs":
+        what = f"{objective.sense} the {over.name} of {words(response)}"
+        raise NoBoundError(f"{what} is no convex problem, so no bound is known")
+    row = replace(row, final=over.at_end)
+    if norm or over.is_magnitude:
         return row, sign
     return replace(row, by_component=True, matrix=sign * row.matrix, known=_scaled(row.known, sign)), sign
 
@@ -147,23 +149,23 @@ def _row(system: System, response: Response) -> Bounded:
 
 def _limit_rows(system: System, row: ResponseRow, turns: dict[str, float]) -> tuple[list[Bounded], str]:
     """The limit as rows with a radius, and a remark where it had to be widened. Raises NoBoundError."""
-    response, over = row.response, row.over_time
+    response, over = row.response, REDUCTIONS[row.over_time]
     if not kind_of(response).of_point:
         raise NoBoundError("not a matter of the motion of centres of mass")
-    if over in ("mean", "rms", "integral"):
+    if over.is_integral:
         raise NoBoundError("neither a peak nor a final value")
     made = _row(system, response)
-    if over == "final" and made.order == 2:
+    if over.at_end and made.order == 2:
         raise NoBoundError("one instant says nothing of an acceleration")
-    made = replace(made, final=over == "final")
+    made = replace(made, final=over.at_end)
     norm = response.component == "norm"
-    above = row.sense in ("limit", "equals") and (over in ("max", "max_abs", "final"))
-    below = not norm and row.sense in ("at_least", "equals") and over in ("min", "final")
+    above = row.sense in ("limit", "equals") and (over.is_largest or over.at_end)
+    below = not norm and row.sense in ("at_least", "equals") and (over.is_smallest or over.at_end)
     if not above and not below:
         raise NoBoundError("not convex")
     wider, made, remark = _widened(system, response, made, turns)
     rows = []
-    if above and (norm or over == "max_abs"):
+    if above and (norm or over.is_magnitude):
         rows.append(replace(made, radius=row.bound + wider))
     elif above:
         rows.append(replace(made, radius=row.bound + wider, by_component=True))
@@ -210,7 +212,7 @@ def _note_angle(system: System, row: ResponseRow, found: Limits) -> bool:
     """Whether a row limits how far a body turns against one that does not; then it is noted."""
     response = row.response
     kind = kind_of(response)
-    if not kind.is_position or kind.of_point or row.over_time != "max_abs" or row.sense == "at_least":
+    if not kind.is_position or kind.of_point or not REDUCTIONS[row.over_time].is_magnitude or row.sense == "at_least":
         return False
     if response.relative_to not in system.angles or response.body is None:
         return False

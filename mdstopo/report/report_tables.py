@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case, ResponseRow
-from mdstopo.case.response_units import unit_of, unit_of_value, words
+from mdstopo.case.over_time import REDUCTIONS
+from mdstopo.case.response_units import unit_of_value, words
 from mdstopo.case.stages import stage_count
 from mdstopo.limiting.compare import kept_iterates
 from mdstopo.plots.member_forces import Chosen, forces_of
@@ -18,12 +19,6 @@ from mdstopo.store.result_reader import ResultView
 FINE, LISTED = 41, 300
 #: of a bound: what is nearer to it is on it
 NOTHING = 1e-12
-#: `over_time` whose value is that of a moment: what is largest of the values there
-_PEAKS: dict[str, Callable[[Floats], Floats]] = {
-    "max": lambda values: values,
-    "min": lambda values: -values,
-    "max_abs": np.abs,
-}
 
 
 def best_iterate(source: Source) -> int | None:
@@ -95,10 +90,7 @@ def constraint_words(case: Case, row: Any) -> str:
 
 
 def _unit(row: Any) -> str:
-    if not isinstance(row, ResponseRow):
-        return ""
-    unit = unit_of(row.response)
-    return f"{unit} s" if row.over_time == "integral" else unit
+    return unit_of_value(row) if isinstance(row, ResponseRow) else ""
 
 
 def peak_of(
@@ -110,15 +102,16 @@ def peak_of(
     times, values (T,): samples.
     at (t,): the response at other times.
     """
-    if over_time == "final":
+    reduction = REDUCTIONS[over_time]
+    if reduction.at_end:
         return float(times[-1]), float(values[-1])
-    if over_time not in _PEAKS or not np.isfinite(values).all():
+    if not reduction.signs or not np.isfinite(values).all():
         return None
-    size = _PEAKS[over_time]
-    k = int(size(values).argmax())
+    signs = np.array(reduction.signs)[:, None]
+    k = int((signs * values).max(axis=0).argmax())
     fine = np.linspace(times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)], FINE)
     there = at(fine)
-    j = int(size(there).argmax())
+    j = int((signs * there).max(axis=0).argmax())
     return float(fine[j]), float(there[j])
 
 

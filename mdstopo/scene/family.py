@@ -2,11 +2,9 @@
 
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
+from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.responses import kind_of
 from mdstopo.scene.signal_segments import formulas_of
-
-#: reductions of stored energy that the first family computes
-_REDUCTIONS = frozenset({"max", "min", "mean", "integral", "final"})
 
 
 def beyond_springs(case: Case) -> str:
@@ -43,7 +41,7 @@ def beyond_springs(case: Case) -> str:
     for objective in case.objectives:
         if not kind_of(objective.response).is_energy:
             return f"the response {objective.response.kind}"
-        if objective.over_time not in _REDUCTIONS:
+        if not REDUCTIONS[objective.over_time].springs:
             return f"over_time: {objective.over_time}"
     if any(isinstance(row, ResponseRow) for row in case.constraints):
         return "constraints on a response"

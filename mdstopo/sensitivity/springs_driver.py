@@ -1,12 +1,14 @@
 """Springs between free bodies, for the engine: their scenes, and a driver that simulates and differentiates them."""
 
 from collections.abc import Mapping
+from pkgutil import resolve_name
 from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mdstopo.case.model import Case, MemberGroup
+from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.integrators.driver import Driver
 from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult
 from mdstopo.scene.compile_scene import Scene, compile_members, compile_scene, state_order
@@ -14,7 +16,6 @@ from mdstopo.scene.diagnosis import Diagnosis
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray
 from mdstopo.scene.vibration_modes import Modes
-from mdstopo.sensitivity.reductions import INTEGRALS, REDUCTIONS
 from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.status import Status
 
@@ -26,8 +27,9 @@ class SpringsDriver(Driver):
     """One scene of springs between free bodies, ready to run; `integrators.scene_driver.SceneDriver` tells how."""
 
     def __init__(self, case: Case, scene: Scene, options: DriverOptions) -> None:
-        reductions = np.array([REDUCTIONS[each.over_time] for each in options.looked], dtype=np.int64)
-        integrated = any(each.over_time in INTEGRALS for each in options.looked)
+        kinds = [REDUCTIONS[each.over_time] for each in options.looked]
+        reductions = np.array([resolve_name(kind.springs) for kind in kinds], dtype=np.int64)
+        integrated = any(kind.is_integral for kind in kinds)
         super().__init__(scene, options, _response_entries, reductions, integrated)
         self.case = case
         self._diagnosis = Diagnosis(case, scene)

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import optimize, stats
 
+from mdstopo.case.losses import LOSSES
 from mdstopo.case.measurements import Measured
-from mdstopo.fit.least_squares import Minimum, loss
+from mdstopo.fit.least_squares import Minimum
+from mdstopo.fit.loss_functions import for_scipy, loss
 from mdstopo.fit.statistics import statistics
 
 
@@ -78,12 +80,41 @@ def test_a_direction_that_the_data_hardly_tell_is_named_and_keeps_its_wide_inter
     assert told.deviation[1] == pytest.approx(500.0 / np.sqrt(12 * np.var(x)), rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["linear", "huber", "soft_l1", "cauchy"])
-def test_pull_and_bend_are_the_derivatives_of_a_loss(name: str) -> None:
+@pytest.mark.parametrize("name", LOSSES)
+def test_influence_and_its_slope_are_the_derivatives_of_a_loss(name: str) -> None:
     r = np.array([-3.1, -1.4, -0.6, 0.0, 0.3, 0.9, 1.2, 4.0])
     h = 1e-5
-    rho, pull, bend = loss(name, r)
+    rho, influence, slope = loss(name, r)
     up, down = loss(name, r + h), loss(name, r - h)
-    np.testing.assert_allclose(pull, (up[0] - down[0]) / (4.0 * h), atol=1e-9)
-    np.testing.assert_allclose(bend, (up[1] - down[1]) / (2.0 * h), atol=1e-9)
+    np.testing.assert_allclose(influence, (up[0] - down[0]) / (4.0 * h), atol=1e-9)
+    np.testing.assert_allclose(slope, (up[1] - down[1]) / (2.0 * h), atol=1e-9)
     assert np.all(rho >= 0.0)
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_a_loss_of_squares_as_scipy_takes_it_has_its_derivatives(name: str) -> None:
+    found = for_scipy(name)
+    if isinstance(found, str):
+        assert not LOSSES[name].is_robust
+        return
+    z = np.array([0.0, 0.04, 0.5, 1.7, 9.0])
+    rho, first, second = found(z)
+    np.testing.assert_allclose(rho, loss(name, np.sqrt(z))[0])
+    assert np.all(np.isfinite(second))
+    inside, h = z[1:], 1e-6
+    up, down = found(inside + h), found(inside - h)
+    np.testing.assert_allclose(first[1:], (up[0] - down[0]) / (2.0 * h), rtol=1e-7)
+    np.testing.assert_allclose(second[1:], (up[1] - down[1]) / (2.0 * h), atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["huber", "soft_l1", "cauchy"])
+def test_a_line_with_outliers_is_fitted_as_by_scipys_loss_of_that_name(name: str) -> None:
+    x = np.linspace(0.0, 3.0, 12)
+    y = 1.0 + 2.0 * x + 0.1 * np.sin(9.0 * x)
+    y[[3, 8]] += 4.0
+    ours, theirs = (
+        optimize.least_squares(lambda p: p[0] + p[1] * x - y, [0.0, 0.0], loss=each, xtol=1e-12)
+        for each in (for_scipy(name), name)
+    )
+    np.testing.assert_allclose(ours.x, theirs.x, rtol=1e-7)
+    assert ours.cost == pytest.approx(theirs.cost, rel=1e-12)

@@ -7,7 +7,6 @@ from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
 from mdstopo.general import peak_search
 from mdstopo.general.extremes import COLUMNS, RATE, SAMPLES, SIGN, TIME, VALUE
-from mdstopo.general.general_driver import PEAKS
 from tests.general.support import design_of
 from tests.general.test_row_sweep import CASES, IMPLICIT
 from tests.space.in_python import in_python
@@ -50,10 +49,10 @@ def test_nothing_on_the_motion_is_higher_than_the_highest_peak(name, solver):
     for driver, count in drivers(name, solver):
         t = driver.states()[0][: count + 1].copy()
         for j, reduction in enumerate(driver.scene.reductions):
-            if reduction not in PEAKS:
+            if not reduction.is_largest:
                 continue
             looked += 1
-            both = PEAKS[reduction]
+            both = reduction.is_magnitude
             rows = rows_of(driver, j, count, both, not driver.method.kind.adaptive)
             chosen = np.unique(np.linspace(0, count - 1, min(count, 150)).astype(int))
             places = np.array([(k, c) for k in chosen for c in fractions])
@@ -75,9 +74,9 @@ def test_steps_that_are_left_out_hold_no_peak(name):
     compared = 0
     for driver, count in drivers(name, IMPLICIT):
         for j, reduction in enumerate(driver.scene.reductions):
-            if reduction in PEAKS:
-                whole = rows_of(driver, j, count, PEAKS[reduction], False, 0.3)
-                sparing = rows_of(driver, j, count, PEAKS[reduction], True, 0.3)
+            if reduction.is_largest:
+                whole = rows_of(driver, j, count, reduction.is_magnitude, False, 0.3)
+                sparing = rows_of(driver, j, count, reduction.is_magnitude, True, 0.3)
                 assert np.array_equal(whole, sparing)
                 compared += 1
     assert compared
@@ -88,9 +87,9 @@ def test_steps_that_are_left_out_hold_no_peak(name):
 def test_inside_steps_rates_vanish_at_peaks_and_none_is_told_twice(name, solver):
     for driver, count in drivers(name, solver):
         for j, reduction in enumerate(driver.scene.reductions):
-            if reduction not in PEAKS:
+            if not reduction.is_largest:
                 continue
-            rows = rows_of(driver, j, count, PEAKS[reduction], False)
+            rows = rows_of(driver, j, count, reduction.is_magnitude, False)
             values = rows[:, SIGN] * rows[:, VALUE]
             assert np.all(np.diff(values) <= 0.0)
             assert len({(row[TIME], row[SIGN], row[6]) for row in rows}) == len(rows)

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mdstopo.case.uncertain import Discrete, Lognormal, Measure, Normal, Uniform
+from mdstopo.case.number_distributions import DISTRIBUTIONS as RECORDS
+from mdstopo.case.number_distributions import Discrete, Lognormal, Normal, Uniform
+from mdstopo.case.uncertain import Measure
 from mdstopo.robust.intervals import student
 from mdstopo.robust.robust_measures import estimate
 from mdstopo.robust.sample import check_sample, design_sample, generators, lattice
@@ -19,6 +21,10 @@ DISTRIBUTIONS = [
     (Lognormal(225.0, 90.0), None),
     (Discrete((1.0, 5.0, 2.0), (0.5, 0.125, 0.375)), None),
 ]
+
+
+def test_every_distribution_is_compared():
+    assert {type(own) for own, _ in DISTRIBUTIONS} == set(RECORDS.values())
 
 
 @pytest.mark.parametrize(("own", "other"), DISTRIBUTIONS, ids=lambda each: getattr(each, "type", ""))
