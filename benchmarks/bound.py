@@ -161,7 +161,7 @@ def _bound(made: Scene, aim: str, other: str, limit: float) -> float | None:
 
 def _values(case: Case, drawn: Callable[[Case], np.ndarray]) -> np.ndarray:
     """(K, 2) acceleration and travel of the designs that keep the scene's own limits and can be computed."""
-    evaluator, found = Evaluator(case, beside=False), []
+    evaluator, found = Evaluator(case, in_background=False), []
     for design in drawn(case):
         seen = evaluator.evaluate(design, gradient=False)
         kept = all(

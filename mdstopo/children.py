@@ -40,7 +40,7 @@ def command(module: str, *words: str) -> list[str]:
 
 
 def end_with_parent(source: IO[bytes]) -> None:
-    """End this process as soon as its input is closed, in whatever it is at.
+    """End this process as soon as its input is closed, whatever it is doing.
 
     source: the reading end of a pipe that only the parent holds; the system closes it however the parent ends.
     """

@@ -21,7 +21,7 @@ _KINDS = "displacement", "rotation", "speed", "angular velocity"
 
 
 def coarse(driver: SceneDriver, alpha: FloatArray) -> str:
-    """Why the driver's fixed step is far too large for alpha (N,), or nothing.
+    """Why the driver's fixed step is far too long for the motion with alpha (N,), in words; empty where it is not.
 
     A motion that the step cannot compute at all is for the computation itself to report.
     """

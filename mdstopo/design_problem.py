@@ -44,7 +44,7 @@ class DesignEvaluator(Protocol):
     def evaluate(
         self, alpha: Floats, gradient: bool = True, sensitivity: str | None = None, rows: Rows = USUAL
     ) -> Evaluation: ...
-    def looking_at(self, objectives: Sequence[str]) -> "DesignEvaluator": ...
+    def with_objectives(self, objectives: Sequence[str]) -> "DesignEvaluator": ...
     def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any: ...
 
 
@@ -71,7 +71,7 @@ class DesignProblem:
         self._places = active
         self._objectives = [case.objectives[i] for i in active]
         self._signs = [sign_of(objective) for objective in self._objectives]
-        self._evaluator = evaluator.looking_at([objective.name for objective in self._objectives])
+        self._evaluator = evaluator.with_objectives([objective.name for objective in self._objectives])
         self._factor: Floats | None = None
         #: what x stands for
         self.space = case.space
@@ -92,8 +92,8 @@ class DesignProblem:
             or self.even > 0
             or any(not kind_of(objective.response).is_energy for objective in self._objectives)
         )
-        looked: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
-        members = any(kind_of(each.response).of_members for each in looked)
+        aims: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
+        members = any(kind_of(each.response).of_members for each in aims)
         # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
         cones = len(self.initial) < WIDE
         few, many = Rows(*NEAR, cones=cones), Rows(*ALL, cones=cones)
@@ -111,17 +111,17 @@ class DesignProblem:
         return self._with_all_that_compete(self._design(x), gradient)
 
     def pricing_states(self, evaluation: Evaluation, rows: Floats) -> Any:
-        """What the rows of U and those of constraints on responses, each times its factor (R + C,), ask of members,
-        built or not, at the last evaluation.
+        """The pricing states of a weighted sum of the rows of U and of constraints on responses, with factors (R +
+        C,), at the last evaluation.
 
         Where nothing is shared and no parameter varies.
         """
         of_limits = {f"constraints[{i}]": evaluation.constraint_peaks[i] for i, _ in self._responses}
-        looked = {**evaluation.peaks, **of_limits}
-        places = {name: len(found) for name, found in looked.items()}
+        all_peaks = {**evaluation.peaks, **of_limits}
+        places = {name: len(found) for name, found in all_peaks.items()}
         unit = iter(np.eye(sum(places.values())))
         marked = {
-            name: tuple(Peak(peak.time, peak.value, next(unit)) for peak in found) for name, found in looked.items()
+            name: tuple(Peak(peak.time, peak.value, next(unit)) for peak in found) for name, found in all_peaks.items()
         }
         # the same rows with one number a peak in the place of its gradient: how a row is made of peaks
         other = copy(self)
@@ -274,19 +274,20 @@ class DesignProblem:
 
 
 class Cones(NamedTuple):
-    """`offset` (R,) and `across` (R, N) of rows; see `problem.Sample`."""
+    """What the optimiser has to know of rows that are norms of vectors: `offset` (R,) and `across` (R, N); see
+    `problem.Sample`."""
 
     offset: Floats
     across: Floats
 
     @classmethod
     def none(cls) -> "Cones":
-        """No row is a norm."""
+        """Cones for rows of which none is the norm of a vector."""
         return cls(np.zeros(0), np.zeros((0, 0)))
 
     @classmethod
     def of(cls, rows: Sequence[tuple[Peak, float, float]], pull: Callable[[Floats], Floats]) -> "Cones":
-        """The cones of rows (peak, scale, offset): scale |w| - offset; scale NaN where a row is no norm."""
+        """Cones of rows (peak, scale, offset), each scale |w| - offset; scale NaN where a row is no norm."""
         shaped = [peak.gradient is not None and peak.shape != "plain" and scale == scale for peak, scale, _ in rows]
         if not any(shaped):
             return cls.none()
@@ -328,10 +329,10 @@ def sign_of(objective: Objective) -> float:
     return -1.0 if objective.sense == "maximize" else 1.0
 
 
-def competes(looked: Objective | ResponseRow, sign: float) -> bool:
+def competes(aim: Objective | ResponseRow, sign: float) -> bool:
     """Whether every competing peak of an objective or a constraint is a lower bound of sign times its value."""
-    reduction = REDUCTIONS[looked.over_time]
-    if reduction.at_end and kind_of(looked.response).of_members:
+    reduction = REDUCTIONS[aim.over_time]
+    if reduction.at_end and kind_of(aim.response).of_members:
         return sign > 0.0  # members compete at the end, too
     return reduction.is_largest if sign > 0.0 else reduction.is_smallest
 

@@ -32,7 +32,7 @@ from mdstopo.scene.vibration_modes import Modes
 from mdstopo.sensitivity.scene_family import SceneFamily
 from mdstopo.sensitivity.springs_driver import SPRINGS
 from mdstopo.status import Status
-from mdstopo.warm import Beside
+from mdstopo.warm import BackgroundCompiler
 
 if TYPE_CHECKING:
     from mdstopo.error_estimate import Estimator
@@ -54,16 +54,17 @@ HISTORY = 50
 
 
 class Evaluator:
-    """A case, ready to be evaluated again and again.
+    """A case, compiled once, whose designs can be evaluated again and again.
 
-    beside: compile with a second process at the first use on a machine; share: what else that does (`warm`). sample:
-    0, or which of the scene's other roundings it computes (`scene.rounding`); what it tells is then not in the file's
-    coordinates. beyond: why the kernels of general scenes are taken for a case that does not need them by itself, empty
-    where nothing else asks for them. Raises CaseError where the case asks for what the engine cannot do yet.
+    in_background: compile with a second process at the first use on a machine; share: what else that does (`warm`).
+    sample: 0, or which of the scene's other roundings it computes (`scene.rounding`); what it tells is then not in the
+    file's coordinates. beyond: why the kernels of general scenes are taken for a case that does not need them by
+    itself, empty where nothing else asks for them. Raises CaseError where the case asks for what the engine cannot do
+    yet.
     """
 
     def __init__(
-        self, case: Case, beside: bool = True, share: Sequence[str] = (), sample: int = 0, beyond: str = ""
+        self, case: Case, in_background: bool = True, share: Sequence[str] = (), sample: int = 0, beyond: str = ""
     ) -> None:
         refused = refusals(case)
         if refused:
@@ -80,8 +81,8 @@ class Evaluator:
             if case.solver.integrator == AUTO and each.steps and not getattr(kind, each.steps)
         }
         self._may_be_coarse = case.solver.step is not None and kind.finds_step
-        self._compiles_beside = beside
-        self._beside = Beside(kind.name, share) if beside and not self.beyond else None
+        self._compiles_in_background = in_background
+        self._background = BackgroundCompiler(kind.name, share) if in_background and not self.beyond else None
         self._design_map = _design_map_of(case)
         #: the case whose variables scenes know
         own = case if self._design_map is None else self._design_map.case
@@ -135,7 +136,7 @@ class Evaluator:
 
     @property
     def integrator_reason(self) -> str:
-        """Why it is this one, as a sentence without a full stop."""
+        """Why this integrator was chosen, as a sentence without a full stop."""
         return self._choice[1]
 
     @property
@@ -144,12 +145,12 @@ class Evaluator:
         notes: list[str] = []
         for scene in self.scenes.values():
             notes += [note for note in scene.skipped if note not in notes]
-        unused = [name for name, looked in self._by_load_case.items() if not looked and self.case.objectives]
+        unused = [name for name, aims in self._by_load_case.items() if not aims and self.case.objectives]
         return notes + [f"load case {name}: nothing looks at it" for name in unused]
 
     @property
     def held(self) -> int:
-        """Bytes of the steps that are held between calls."""
+        """How many bytes of steps are kept between calls."""
         return sum(driver.room.nbytes for driver in self._drivers.values())
 
     def evaluate(
@@ -177,7 +178,7 @@ class Evaluator:
         gradient = gradient and not edge
         exact = gradient and SENSITIVITIES[method].comes_with_values
         status, message, grazing = Status.OK, "", ""
-        looked: dict[str, tuple[Peak, ...]] = {}
+        all_peaks: dict[str, tuple[Peak, ...]] = {}
         work: list[list[int]] = []
         begun = {} if nowhere else self._side_by_side(design, exact, rows)
         if nowhere:
@@ -205,16 +206,16 @@ class Evaluator:
                 pulled = (None if each is None else design_map.pull_back(each) for each in (gradients, across))
                 gradients, across = pulled
             for j, key in enumerate(keys):
-                looked[key] = _peaks(result, j, gradients, across, driver.shapes[j])
+                all_peaks[key] = _peaks(result, j, gradients, across, driver.shapes[j])
         if edge and status.ok:
             status, message = Status.NO_GRADIENT, edge
         if grazing and gradient and status.ok:
             status, message = Status.GRAZING, grazing
-        if self._unsure and gradient and status.usable and not _has_slopes(looked):
+        if self._unsure and gradient and status.usable and not _has_slopes(all_peaks):
             where = "group " if len(self._unsure) == 1 else "one of the groups "
             message = f"a slope of a formula of {where}{', '.join(self._unsure)} is infinite or has no value"
             status = Status.NO_GRADIENT
-        return self._evaluation(looked, gradient, work_named(_total(work)), status, message)
+        return self._evaluation(all_peaks, gradient, work_named(_total(work)), status, message)
 
     def _side_by_side(self, design: FloatArray, exact: bool, rows: Rows) -> dict[str, CallOutcome]:
         """Outcomes of all load cases by name, evaluated side by side on threads; empty where that does not pay.
@@ -253,7 +254,8 @@ class Evaluator:
         return Estimator(self)
 
     def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any:
-        """What a weighted sum of peaks of the last evaluation asks of members, whether they are built or not.
+        """The pricing states of a weighted sum of peaks of the last evaluation: from them the price of any member
+        follows.
 
         weights: of the peaks of each objective, and of each constraint on a response by its key path, in their order.
         After an evaluation with gradients.
@@ -276,14 +278,14 @@ class Evaluator:
         return self._family.candidates(self.scenes, place, own, ends, count)
 
     def otherwise(self, sample: int = 0, **solver: Any) -> "Evaluator":
-        """The evaluator of the same case with other solver settings, made once for each set of them.
+        """An evaluator of the same case with other solver settings, made once for each set of them.
 
         sample: as of the constructor.
         """
         key = (sample, *sorted(solver.items()))
         if key not in self._others:
             case = replace(self.case, solver=replace(self.case.solver, **solver))
-            self._others[key] = Evaluator(case, self._compiles_beside, sample=sample, beyond=self._asked_beyond)
+            self._others[key] = Evaluator(case, self._compiles_in_background, sample=sample, beyond=self._asked_beyond)
         return self._others[key]
 
     def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
@@ -330,15 +332,15 @@ class Evaluator:
 
         return DesignProblem(self, scalarisation)
 
-    def looking_at(self, objectives: Sequence[str]) -> "Evaluator":
-        """The evaluator of the same case with some of its objectives alone: the others cost nothing."""
+    def with_objectives(self, objectives: Sequence[str]) -> "Evaluator":
+        """An evaluator of the same case with some of its objectives alone: the others are not computed."""
         names = tuple(objectives)
         if names == tuple(objective.name for objective in self.case.objectives):
             return self
         if names not in self._narrower:
             chosen = tuple(objective for objective in self.case.objectives if objective.name in names)
             narrower = replace(self.case, objectives=chosen)
-            self._narrower[names] = Evaluator(narrower, beside=False, beyond=self._asked_beyond)
+            self._narrower[names] = Evaluator(narrower, in_background=False, beyond=self._asked_beyond)
         return self._narrower[names]
 
     def settled(self, alpha: FloatArray, load_case: str) -> Settled | None:
@@ -346,7 +348,7 @@ class Evaluator:
         return self.driver(load_case).settled(self.computed(self.design(alpha))) if self.case.solver.settle else None
 
     def degrees_of_freedom(self, load_case: str) -> int:
-        """Coordinates that are free, less the independent rows of joints."""
+        """The number of free coordinates, less that of the independent rows of joints."""
         return self.scenes[load_case].degrees_of_freedom
 
     def natural_frequencies(self, alpha: FloatArray, load_case: str) -> FloatArray:
@@ -364,13 +366,14 @@ class Evaluator:
         return checked(self.case, alpha)
 
     def computed(self, design: FloatArray) -> FloatArray:
-        """The design that scenes have in the place of one of the case (N + P,): what follows from defined names."""
+        """The design that the compiled scenes have for a design (N + P,) of the case: with what follows from defined
+        names."""
         return design if self._design_map is None else self._design_map.design(design)
 
     @cached_property
     def _seen(self) -> list[tuple[str, tuple[str, ...], SceneDriver]]:
         """The load cases that objectives or constraints are of: name, the names of these, driver."""
-        return [(name, tuple(looked), self.driver(name)) for name, looked in self._by_load_case.items() if looked]
+        return [(name, tuple(aims), self.driver(name)) for name, aims in self._by_load_case.items() if aims]
 
     def _without_slope(self, design: FloatArray, gradient: bool) -> str:
         """Why a gradient that is wanted is not there at this design, or nothing: alpha^mu has no slope at 0 where
@@ -404,9 +407,7 @@ class Evaluator:
     def _held(self, name: str, told: "Callable[[GeneralDriver, FloatArray], str]") -> str:
         """Of the first load case in which steps of an integrator are held short what tells so; else drivers stay."""
         method = method_of(name, self.case.solver)
-        drivers = {
-            load_case: self._made(load_case, method) for load_case, looked in self._by_load_case.items() if looked
-        }
+        drivers = {load_case: self._made(load_case, method) for load_case, aims in self._by_load_case.items() if aims}
         for driver in drivers.values():
             held: str = told(cast("GeneralDriver", driver), self.computed(self._design.take(self.case.start)))
             if held:
@@ -423,11 +424,11 @@ class Evaluator:
         return self._drivers[name]
 
     def compile_responses(self) -> None:
-        """Have the machine code on the disk that looks back at steps, without any steps (`SceneDriver`)."""
+        """Compile what evaluates responses and gradients from steps, without any steps (`SceneDriver`)."""
         self._unused().compile_responses()
 
     def compile_steps(self) -> None:
-        """Have the machine code on the disk that makes steps of a scene with joints or other laws, without any."""
+        """Compile what makes steps of a scene with joints or other laws, without making any."""
         cast("GeneralDriver", self._unused()).compile_steps()
 
     def _unused(self) -> SceneDriver:
@@ -447,9 +448,9 @@ class Evaluator:
 
     def _made(self, name: str, method: Method, fits: bool = True) -> SceneDriver:
         """A driver of one load case by a method; fits: as of `DriverOptions`."""
-        solver, looked = self.case.solver, tuple(self._by_load_case[name].values())
+        solver, aims = self.case.solver, tuple(self._by_load_case[name].values())
         tolerance, step = _of_motion(solver.tolerance), solver.step or 0.0
-        options = DriverOptions(method, tolerance, step, looked, self._design.values, self._beside, fits)
+        options = DriverOptions(method, tolerance, step, aims, self._design.values, self._background, fits)
         driver = self._family.driver(self._near, self.scenes[name], options)
         if method.kind.finds_step and solver.step is None:
             from mdstopo.integrators.default_step import default_step
@@ -483,7 +484,7 @@ class Evaluator:
 
     def _evaluation(
         self,
-        looked: Mapping[str, tuple[Peak, ...]],
+        all_peaks: Mapping[str, tuple[Peak, ...]],
         gradient: bool,
         work: dict[str, int],
         status: Status,
@@ -492,13 +493,13 @@ class Evaluator:
         if not status.usable:
             lost = (Peak(np.nan, np.nan, None),)
             keys = [*self._names, *self._limited.values()]
-            looked = {key: looked.get(key, lost) if status is Status.NO_GRADIENT else lost for key in keys}
+            all_peaks = {key: all_peaks.get(key, lost) if status is Status.NO_GRADIENT else lost for key in keys}
         objectives: dict[str, float] = {}
         times: dict[str, float] = {}
         peaks: dict[str, tuple[Peak, ...]] = {}
         slopes: dict[str, FloatArray] = {}
         for name in self._names:
-            found = peaks[name] = looked[name]
+            found = peaks[name] = all_peaks[name]
             times[name], objectives[name], slope, *_ = found[0]
             if gradient and slope is not None:
                 slopes[name] = slope
@@ -507,8 +508,8 @@ class Evaluator:
         if self._limited or self._design.moving:
             rows = rows.copy()
             for i, key in self._limited.items():
-                limits[i] = looked[key]
-                peak = looked[key][0]
+                limits[i] = all_peaks[key]
+                peak = all_peaks[key][0]
                 constraints[i] = peak.value - self._design.bounds[i]
                 rows[i] = np.nan if peak.gradient is None else peak.gradient
         made = Evaluation(objectives, slopes, times, constraints, rows, peaks, work, status, message, limits)
@@ -545,9 +546,9 @@ def _of_motion(tolerance: float) -> float:
     return min(tolerance, max(LOOSEST, 0.5 * tolerance))
 
 
-def _has_slopes(looked: Mapping[str, tuple[Peak, ...]]) -> bool:
+def _has_slopes(all_peaks: Mapping[str, tuple[Peak, ...]]) -> bool:
     """Whether all derivatives of the responses are finite."""
-    rows = (peak.gradient for peaks in looked.values() for peak in peaks)
+    rows = (peak.gradient for peaks in all_peaks.values() for peak in peaks)
     return all(row is None or bool(np.isfinite(row).all()) for row in rows)
 
 

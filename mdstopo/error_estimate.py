@@ -31,7 +31,7 @@ SAMPLES = 1, 2
 
 
 class AnyEvaluator(Protocol):
-    """What an estimate asks of `engine.Evaluator`, where each function is described."""
+    """What an error estimate needs of `engine.Evaluator`, where each function is described."""
 
     case: Case
 
@@ -53,7 +53,7 @@ class Estimator:
         self.why = ""
 
     def errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None) -> dict[str, ErrorEstimate]:
-        """Of an evaluation of alpha (N,), by objective; empty where it failed, or the finer one."""
+        """Error estimates of an evaluation at alpha (N,), by objective; empty where it, or the finer one, failed."""
         if not found.status.usable:
             return {}
         kind = INTEGRATORS[self._evaluator.integrator]

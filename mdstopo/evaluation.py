@@ -23,7 +23,7 @@ Shape: TypeAlias = Literal["plain", "absolute", "norm"]
 
 
 class Rows(NamedTuple):
-    """Which peaks of a response are told, and what of them; None: what the engine takes by itself.
+    """How many peaks of a response are reported, and what of them; None: as the engine does by default.
 
     window: how far below the highest a peak may be to compete, relative to it. most: how many of one response at most.
     cones: tell `Peak.across`, too.
@@ -61,7 +61,8 @@ class Peak(NamedTuple):
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """Of one objective, absolute. value: of G; gradient: of the worst entry of dG/dalpha, NaN where there is none."""
+    """Absolute errors of one objective. value: of G; gradient: of the worst entry of dG/dalpha, NaN where there is
+    none."""
 
     value: float
     gradient: float

@@ -40,7 +40,7 @@ class Responses:
         self._last: tuple[FloatArray, FloatArray, FloatArray] | None = None
 
     def at(self, x: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Values (m,) and derivatives (m, n) at x (n,)."""
+        """The values (m,) of objectives and constraints and their derivatives (m, n), at x (n,)."""
         asked = np.array(x, dtype=np.float64)
         if self._last is None or not np.array_equal(self._last[0], asked):
             alpha, values = asked[: self.case.n_design], self.case.space.named(asked)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def version_of(package: str) -> str:
-    """The version of a package as it is installed; empty where it is not."""
+    """The version of an installed package; empty where it is not installed."""
     module = sys.modules.get(package)
     if module is not None:
         return str(module.__version__)

@@ -18,7 +18,7 @@ from mdstopo.functions import NoValueError, Responses
 
 
 class CaseComponent(om.ExplicitComponent):  # type: ignore[misc, unused-ignore]
-    """Objectives and constraints of a case by its design."""
+    """An OpenMDAO component that computes the objectives and constraints of a case from its design."""
 
     def initialize(self) -> None:
         """Say which options there are."""
@@ -39,7 +39,7 @@ class CaseComponent(om.ExplicitComponent):  # type: ignore[misc, unused-ignore]
         self.declare_partials("*", "*")
 
     def compute(self, inputs: Any, outputs: Any) -> None:
-        """Objectives and constraints."""
+        """Compute objectives and constraints."""
         values, _ = self._at(inputs)
         for place, name in enumerate(self._case_responses.objectives):
             outputs[name] = values[place]
@@ -47,7 +47,7 @@ class CaseComponent(om.ExplicitComponent):  # type: ignore[misc, unused-ignore]
             outputs["constraints"] = values[len(self._case_responses.objectives) :]
 
     def compute_partials(self, inputs: Any, partials: Any) -> None:
-        """Their derivatives."""
+        """Compute the derivatives of objectives and constraints."""
         _, slopes = self._at(inputs)
         count = len(self._case_responses.objectives)
         for own, part in self._case_parts.items():

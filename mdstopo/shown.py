@@ -17,7 +17,7 @@ def html_of(value: Any) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """`1 body`, `3 members`."""
+    """A number with its noun, in the plural where it is not one: `1 body`, `3 members`."""
     if count == 1:
         return f"1 {noun}"
     return f"{count:,} {noun[:-1]}ies" if noun.endswith("y") else f"{count:,} {noun}s"

@@ -50,7 +50,8 @@ class RunStatus(enum.StrEnum):
 
 
 def together(ends: Sequence[RunStatus], noun: str) -> tuple[RunStatus, str]:
-    """How several runs stand as one, and how many of them ended how. noun: what they are, in the plural."""
+    """The status of several runs as one, and a sentence on how many of them ended how. noun: what they are, in the
+    plural."""
     counts = {end: ends.count(end) for end in sorted(set(ends))}
     words = ", ".join(f"{count} {end.value.replace('_', ' ')}" for end, count in counts.items())
     reason = f"{len(ends)} {noun}: {words}"

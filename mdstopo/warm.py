@@ -60,10 +60,10 @@ def compilation_due(case: Case) -> bool:
     return not are_kept("mdstopo.general." if beyond_springs(case) else "mdstopo.integrators.")
 
 
-class Beside:
-    """Another process that compiles what evaluates responses, if that has never been compiled here.
+class BackgroundCompiler:
+    """A process in the background that compiles what evaluates responses, if that has never been compiled here.
 
-    share: modules whose `compile_share` it calls before that.
+    share: modules whose `compile_in_background` it calls before that.
     """
 
     def __init__(self, integrator: str, share: Sequence[str] = ()) -> None:
@@ -80,7 +80,7 @@ class Beside:
                 )
 
     def wait(self) -> None:
-        """Let it finish; stop it where this process is interrupted meanwhile."""
+        """Wait for its end; stop it where this process is interrupted meanwhile."""
         child, self._child = self._child, None
         compiled = False
         if child is not None:

@@ -145,7 +145,7 @@ def _timed(clock: Clock, call: Callable[[], object]) -> tuple[float, dict[str, f
 def _balances(evaluator: Evaluator, case: Case, clock: Clock) -> tuple[float, int]:
     """Milliseconds of one balance, and how many the motions of all load cases have; 0, 0 for springs between free
     bodies, whose engine has no balance that can be called by itself."""
-    milliseconds, looked_at, made = 0.0, 0, 0
+    milliseconds, counted, made = 0.0, 0, 0
     for name in evaluator.scenes:
         driver = evaluator.driver(name)
         if not isinstance(driver, GeneralDriver):
@@ -158,8 +158,8 @@ def _balances(evaluator: Evaluator, case: Case, clock: Clock) -> tuple[float, in
             return driver.sample_response(-1, places, True, count)
 
         milliseconds += _timed(clock, look)[1].get("responses", 0.0)
-        looked_at += count
-    return milliseconds / max(looked_at, 1), made
+        counted += count
+    return milliseconds / max(counted, 1), made
 
 
 def _time_table(case: Case, whole: float, phases: dict[str, float], bare: float, balances: float) -> Table:

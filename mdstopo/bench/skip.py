@@ -25,7 +25,7 @@ Scene = dict[str, Any]
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two: a call that is timed, and how much work it is in the omission's unit."""
+    """One of the two measurements: a call that is timed, and how much work it is in the omission's unit."""
 
     call: Callable[[], object]
     work: int
@@ -33,7 +33,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Omission:
-    """What may be left out; the unit in which its work is counted; with all of it, and without."""
+    """Work that may be left out, measured with all of it and without; and the unit in which it is counted."""
 
     what: str
     unit: str
@@ -136,7 +136,7 @@ def zero_weight() -> Omission:
     made = scene(load_cases=loads, loads=[], objectives=objectives, combine={"weights": {"turn": 1, "push": 0}})
     evaluator = Evaluator(read_case(json.dumps(made)))
     design = np.array(evaluator.case.initial)
-    narrow = evaluator.looking_at(["turn"])
+    narrow = evaluator.with_objectives(["turn"])
     sides = [
         Side(partial(each.evaluate, design), int(each.evaluate(design).work["force_sums"]))
         for each in (evaluator, narrow)
@@ -178,11 +178,11 @@ def reverse_from_the_peak() -> Omission:
     }
     solver: Any = {"integrator": "runge_kutta", "tolerance": 1e-10}
 
-    def looking(over_time: str) -> Side:
+    def evaluating(over_time: str) -> Side:
         objectives = {"G": {"response": "energy", "over_time": over_time}}
         return side(made | {"objectives": objectives}, "reverse_steps", **solver)
 
-    return Omission("the reverse sweep after the peak", "reverse steps", looking("final"), looking("max"))
+    return Omission("the reverse sweep after the peak", "reverse steps", evaluating("final"), evaluating("max"))
 
 
 def absent_members() -> Omission:

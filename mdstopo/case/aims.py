@@ -19,7 +19,7 @@ def _none() -> FloatArray:
 
 @frozen
 class Response(Value):
-    """A scalar seen over time.
+    """A number of the state of motion, which is followed over time.
 
     kind: the word of its record (`case.responses`). Fields that a kind does not use are None.
     at_local is in body coordinates of `body`; component: x | y | norm, in space also z. numbers: up to four of
@@ -46,7 +46,7 @@ class Response(Value):
 
     @property
     def parts(self) -> tuple[Response, ...]:
-        """The responses that it is an expression of, or itself."""
+        """The responses of which this one is an expression; itself where it is none."""
         return tuple(each for _, each in self.of) or (self,)
 
 
@@ -91,12 +91,12 @@ class Variable(Value):
 
     @property
     def initials(self) -> FloatArray:
-        """(count,) the initial values."""
+        """(count,) the initial values of the variable."""
         return np.full(self.count, self.initial)
 
     @property
     def of(self) -> str:
-        """What varies, in words."""
+        """What varies, in words: whose parameter, coordinate or name it is."""
         if self.defined:
             return f"define.{self.defined}"
         return f"points {self.points}" if self.points else f"{self.parameter} of {', '.join(self.groups)}"
@@ -133,13 +133,14 @@ class Follows(Value):
     given: Mapping[str, float | str] = field(default_factory=FrozenDict)
 
     def of_kind(self, kind: str) -> tuple[Following, ...]:
-        """The numbers of one kind."""
+        """The numbers of one kind: law, points or scene."""
         return tuple(each for each in self.numbers if each.kind == kind)
 
 
 @frozen
 class VolumeRow(Value):
-    """coefficients (N,) . alpha <= bound (``limit``), = bound (``equals``), >= bound (``at_least``) (Eq. 14).
+    """A linear limit on material or cost (Eq. 14): coefficients (N,) . alpha <=, = or >= bound (``limit``,
+    ``equals``, ``at_least``).
 
     A fraction of the total has become its limit. prices (P,): the same of the values of variables, added to it; none
     where the case has none.
@@ -156,7 +157,7 @@ class VolumeRow(Value):
         object.__setattr__(self, "prices", read_only(self.prices))
 
     def spent(self, design: FloatArray) -> float:
-        """The sum of a design, alpha (N,) with the values of variables (P,) behind it."""
+        """What a design costs: the sum over alpha (N,) and, behind it, the values of variables (P,)."""
         total = float(self.coefficients @ design[: len(self.coefficients)])
         return total + float(self.prices @ design[len(self.coefficients) :]) if len(self.prices) else total
 

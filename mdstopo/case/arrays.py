@@ -89,7 +89,7 @@ class Table(Value):
 
 @frozen
 class TimeFormula(Value):
-    """scale times a formula of t (s) and its parameters, plus offset."""
+    """A formula of the time t (s) and its parameters, multiplied by `scale`, plus an offset."""
 
     text: str
     parameters: tuple[tuple[str, float], ...] = ()
@@ -104,27 +104,27 @@ class TimeFormula(Value):
         return time_program(self.text, tuple(name for name, _ in self.parameters))
 
     def at(self, time: float) -> float:
-        """Its value; NaN where it has none."""
+        """The value of the formula at a time (s); NaN where it has none."""
         from mdstopo.formula.time_formulas import value_at  # most cases have no formulas
 
         return self.scale * value_at(self.text, self.parameters, time) + self.offset
 
     def rate_at(self, time: float) -> float:
-        """Its rate; NaN where it has none."""
+        """The derivative of the formula by time, at a time (s); NaN where it has none."""
         from mdstopo.formula.time_formulas import rate_at  # most cases have no formulas
 
         return self.scale * rate_at(self.text, self.parameters, time)
 
     def sampled(self, times: FloatArray) -> FloatArray:
-        """(T,) its values at times (T,)."""
+        """(T,) the values of the formula at times (T,)."""
         return np.array([self.at(time) for time in times.tolist()])
 
     def times(self, factor: float) -> TimeFormula:
-        """The formula times a factor."""
+        """A formula whose values are multiplied by a factor."""
         return TimeFormula(self.text, self.parameters, self.scale * factor, self.offset * factor)
 
     def shifted(self, by: float) -> TimeFormula:
-        """The formula plus a number."""
+        """A formula whose values are larger by a number."""
         return TimeFormula(self.text, self.parameters, self.scale, self.offset + by)
 
 

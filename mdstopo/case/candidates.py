@@ -78,7 +78,7 @@ def most_cost(group: MemberGroup) -> float:
 
 
 def coefficients_of(design: Sequence[MemberGroup], names: Sequence[str]) -> FloatArray:
-    """(N,) V_i of the members of the groups `names`, 0 of the others."""
+    """(N,) the cost V_i of the members in the groups `names`, 0 of all others."""
     pieces = [group.cost if group.name in names else np.zeros(len(group)) for group in design]
     return np.concatenate(pieces) if pieces else np.zeros(0)
 
@@ -131,7 +131,8 @@ def _suffices(case: Case, row: VolumeRow) -> bool:
 
 
 def spread(n_p: int, n_q: int, count: int | None) -> tuple[IndexArray, IndexArray]:
-    """Points of two grids of so many, evenly spread, which make about so many pairs; all of fewer, or for None."""
+    """Evenly spread points of two grids of n_p and n_q, which make about `count` pairs; all points where that is fewer,
+    or None."""
     share = 1.0 if count is None else min(1.0, math.sqrt(count / (n_p * n_q)))
     many_p, many_q = (min(n, math.ceil(share * n)) for n in (n_p, n_q))
     return np.arange(many_p) * n_p // many_p, np.arange(many_q) * n_q // many_q

@@ -15,7 +15,7 @@ Sizes = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 def with_catalogue(top: Fields, groups: dict[str, MemberGroup], reading: Reading) -> dict[str, Sizes] | None:
-    """By group: sizes and their prices. None where something is wrong, which is noted.
+    """By group: sizes that members may have, and their prices. None where something is wrong, which is noted.
 
     groups: with the design's bounds and powers.
     """

@@ -10,22 +10,22 @@ _PLACES, _RATES = ("x", "y", "z", "qw", "qx", "qy", "qz"), ("x", "y", "z", "turn
 
 
 def point_columns(case: Case) -> tuple[str, ...]:
-    """Of a point."""
+    """Names of the coordinates of a point, for columns of tables."""
     return ("x", "y", "z")[: case.dimension]
 
 
 def state_columns(case: Case, name: str) -> list[str]:
-    """Of q, v or a, as `body.column` for all bodies."""
+    """Names of the columns of q, v or a: `body.column` of all bodies."""
     own = _PLANE if case.dimension == 2 else _PLACES if name == "q" else _RATES
     return [f"{body.name}.{column}" for body in case.bodies for column in own]
 
 
 def reaction_columns(case: Case) -> list[str]:
-    """Of the force and moment of a joint."""
+    """Names of the components of the force and moment in a joint, for columns of tables."""
     return ["Fx", "Fy", "M"] if case.dimension == 2 else ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
 
 
 def state_units(case: Case) -> dict[str, str]:
-    """Of each dataset of a trajectory."""
+    """The unit of each dataset of a trajectory, by its name."""
     places = "m, rad" if case.dimension == 2 else "m, 1"
     return {"t": "s", "q": places, "v": "m/s, rad/s", "a": "m/s^2, rad/s^2", "lambda": "N, N m"}

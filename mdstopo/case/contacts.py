@@ -16,7 +16,7 @@ from mdstopo.case.words import inside, shown
 def build_contacts(
     entries: Any, points: dict[str, PointGrid], frames: Frames, reading: Reading
 ) -> tuple[AnyContact, ...]:
-    """The contacts that can be made."""
+    """The contacts of the case, without those that cannot be made; mistakes are noted."""
     built = []
     named: dict[str, int] = {}
     for index, fields in enumerate(entries if isinstance(entries, list) else ()):
@@ -50,7 +50,7 @@ def _build(
 
 
 def edge_contact(common: dict[str, Any], edge: Fields, frames: Frames, reading: Reading) -> Contact | None:
-    """The contact of points with an edge, None where there is no such edge, which is noted.
+    """The contact of points with an edge of a body; None where there is no such edge, which is noted.
 
     common: what contacts with anything have, as fields of `Contact`.
     """

@@ -32,7 +32,7 @@ class Definitions(Value):
     """A mapping from names to numbers; expressions in it have become numbers before it is read."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """dict of numbers (values may be BAD) or BAD."""
+        """Defined numbers by their names, BAD in the place of what cannot be read; BAD where it is no mapping."""
         if node.kind != MAPPING:
             reading.mistake(path, f"found {found(node)}, allowed is a mapping from names to numbers", node)
             return BAD
@@ -58,17 +58,17 @@ class Definitions(Value):
         return values
 
     def schema(self) -> dict[str, Any]:
-        """object of numbers and texts."""
+        """The JSON Schema: numbers, or texts with expressions, by names."""
         names = {"pattern": f"^{WORD.pattern}$"}
         return {"type": "object", "propertyNames": names, "additionalProperties": {"type": ["number", "string"]}}
 
 
 @frozen
 class DefinedName(Value):
-    """The key path of a defined name, `define.k`."""
+    """The kind of a key path to a defined name, `define.k`."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """The name behind `define.`, or BAD."""
+        """The name behind `define.`, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         section, _, word = value.partition(".") if isinstance(value, str) else ("", "", "")
         if section != SECTION or not word:
@@ -77,7 +77,7 @@ class DefinedName(Value):
         return word
 
     def schema(self) -> dict[str, Any]:
-        """string."""
+        """The JSON Schema: a text that begins with `define.`."""
         return {"type": "string", "pattern": f"^{SECTION}\\.{WORD.pattern}$"}
 
 

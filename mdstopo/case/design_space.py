@@ -20,7 +20,7 @@ from mdstopo.case.arrays import FloatArray, IndexArray
 
 
 class DesignSpace:
-    """Between x (n,) and designs (N + P,).
+    """The map between the optimiser's variables x (n,) and designs (N + P,).
 
     slots (N,): which x each alpha is, in the order of first appearance; None where each is its own. variables: in the
     case's order. Immutable.
@@ -46,7 +46,7 @@ class DesignSpace:
         self.size = self._free + len(self._low)
 
     def expand(self, x: FloatArray) -> FloatArray:
-        """The design (N + P,) of x (n,); x itself where they are the same."""
+        """The design (N + P,) that x (n,) stands for; x itself where both are the same."""
         if self.identity:
             return x
         design = np.empty(self.length)
@@ -56,7 +56,7 @@ class DesignSpace:
         return design
 
     def reduce(self, design: FloatArray) -> FloatArray:
-        """The x (n,) whose design is nearest in alpha: members that share one take the mean of theirs."""
+        """The x (n,) whose design is nearest in alpha: members that share a variable take the mean of theirs."""
         if self.identity:
             return design
         x = np.empty(self.size)
@@ -67,7 +67,7 @@ class DesignSpace:
         return x
 
     def vjp(self, gradient: FloatArray) -> FloatArray:
-        """dU/dx (n,) of dU/d(design) (N + P,)."""
+        """(n,) the derivative by the optimiser's variables, from that by the design (N + P,)."""
         if self.identity:
             return gradient
         own = gradient[: self.n_alpha]
@@ -112,7 +112,8 @@ def _values(pieces: list[tuple[float, int]]) -> FloatArray:
 
 
 def slots_of(counts: Mapping[str, int], shared: Sequence[str], mirrored: Sequence[Sequence[str]]) -> IndexArray | None:
-    """(N,) which x each alpha is; None where each is its own. counts: members of each design group, in order."""
+    """(N,) the number of the optimiser's variable that each alpha is; None where each alpha is a variable of its
+    own."""
     if not shared and not mirrored:
         return None
     first: dict[str, str] = {}

@@ -13,11 +13,12 @@ T = TypeVar("T")
 
 
 class BroughtError(Exception):
-    """A registered record cannot be used; a sentence without a full stop."""
+    """A record that another distribution registers cannot be used; a sentence without a full stop."""
 
 
 class Brought(Generic[T]):
-    """Records that distributions register in a group of entry points, by the word that case files have for them.
+    """The records that other distributions register in one group of entry points, by the word that case files have
+    for them.
 
     enter (record) takes one in and returns what the reader needs of it; it raises TypeError where it is no such record.
     """
@@ -29,12 +30,13 @@ class Brought(Generic[T]):
         self.found: dict[str, T] = {}
 
     def find(self, word: str) -> T | None:
-        """What is registered under a word; None where nothing is. BroughtError where it cannot be used."""
+        """The record that is registered under a word; None where there is none. BroughtError where it cannot be
+        used."""
         self._look(word)
         return self.found.get(word)
 
     def find_all(self) -> dict[str, T]:
-        """All that are registered. BroughtError where one cannot be used; the others are found then."""
+        """All records that are registered. BroughtError where one cannot be used; the others are found then."""
         self._look()
         return self.found
 

@@ -41,7 +41,7 @@ def expression_keys(response: Kind) -> Record:
 
 
 def response_of(stated: Any, frames: Frames, reading: Reading) -> Response | None:
-    """The response that a word, or a mapping with its word, states; None where that is a mistake."""
+    """The response that is stated, as a word or as a mapping from it to its keys; None where that is a mistake."""
     if isinstance(stated, str):
         return Response(stated, dimension=frames.geometry.number)
     if not isinstance(stated, Fields) or len(stated.stated) != 1:

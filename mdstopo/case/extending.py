@@ -113,7 +113,8 @@ def _tree(text: str, base: Path, reading: Reading) -> Node:
 
 
 def lead(root: Node, way: Path) -> None:
-    """Have the files that a tree includes found from another folder, from which `way` leads to the tree's own."""
+    """Change the paths of files that a tree includes, so that they are found from another folder, from which `way`
+    leads to the tree's own."""
     seen: set[int] = set()
     waiting = [pair[1] for word, pair in root.entries.items() if word != "define"]
     while waiting:

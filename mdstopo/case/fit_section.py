@@ -15,7 +15,7 @@ from mdstopo.case.words import inside, number_text
 
 
 def build_fit(top: Fields, root: Node, frames: Frames, reading: Reading) -> Fit | None:
-    """The section; None where it could not be read. root: the whole case."""
+    """The section `fit`; None where it could not be read. root: the whole case."""
     fields = top["fit"]
     if not isinstance(fields, Fields):
         return None

@@ -20,7 +20,7 @@ class Estimate(Value):
 
     @property
     def is_free(self) -> bool:
-        """Whether it is estimated at all."""
+        """Whether the number is estimated: whether its bounds differ."""
         return self.lower < self.upper
 
 

@@ -64,7 +64,7 @@ class Expressions:
         return np.array(values_of(known, self._written))
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        """(K, V) their derivatives by the names at x."""
+        """(K, V) derivatives of the expressions by the defined names, at values x (V,)."""
         found = values_of(dict(zip(self.names, x.tolist(), strict=True)), self._derivatives)
         return np.array(found).reshape(len(self.roots), len(self.names))
 
@@ -74,7 +74,7 @@ class Expressions:
         return [derivative(root, word) for root in self.roots for word in self.names]
 
     def depends(self, k: int) -> list[str]:
-        """The names that expression k depends on."""
+        """The defined names that expression k depends on."""
         return [word for word in names_in(self.roots[k]) if word in self.names]
 
     def jumps(self, k: int) -> str:
@@ -86,7 +86,7 @@ class Expressions:
 
 
 def expressions_of(follows: Follows, numbers: Sequence[Following]) -> Expressions:
-    """Some of the numbers that follow from the names."""
+    """Some of the numbers that follow from defined names, as expressions of these."""
     return Expressions(follows.names, follows.given, [each.expression for each in numbers])
 
 

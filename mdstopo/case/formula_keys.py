@@ -16,13 +16,13 @@ from mdstopo.formula.parser import TIME, WORD, parse, reserved
 
 @frozen
 class FormulaText(Value):
-    """A formula. without: names of a motion that it may not use, with the reason."""
+    """The kind of a text that is a formula. without: names of a motion that it may not use, with the reason."""
 
     without: tuple[str, ...] = ()
     why: str = ""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD; whether names are known is checked where the law's parameters are."""
+        """The text at a node, or BAD; whether names are known is checked where the law's parameters are."""
         value = node.scalar() if node.kind == SCALAR else None
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             value = node.text
@@ -43,12 +43,12 @@ class FormulaText(Value):
         return value
 
     def schema(self) -> Schema:
-        """string, or a number, which is a formula too."""
+        """The JSON Schema: text, or a number, which is a formula too."""
         return {"type": ["string", "number"]}
 
 
 def why_no_name(word: str, taken: Container[str], message: str) -> str:
-    """Why nothing can be called so in a formula; nothing where it can.
+    """Why a word cannot be a name in a formula; empty where it can.
 
     taken: names that such formulas have of their own. message: what is said of these, and of functions.
     """
@@ -61,7 +61,7 @@ def why_no_name(word: str, taken: Container[str], message: str) -> str:
 
 @frozen
 class FormulaNames(Value):
-    """Values of one kind by the names that a formula has for them.
+    """The kind of a mapping from names that a formula uses to values of one kind.
 
     what: their plural; at_least, most: how many there may be.
     """
@@ -72,7 +72,7 @@ class FormulaNames(Value):
     most: int = 20
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """dict (values may be BAD) or BAD."""
+        """The values at a node by their names, BAD in the place of what cannot be read; BAD where it is no mapping."""
         if node.kind != MAPPING or not self.at_least <= len(node.entries) <= self.most:
             how_many = (
                 f"{self.at_least} to {self.most} {self.what}" if self.at_least else f"{self.most} {self.what} at most"
@@ -91,7 +91,7 @@ class FormulaNames(Value):
         return values
 
     def schema(self) -> Schema:
-        """object of values."""
+        """The JSON Schema: a mapping from names to such values."""
         return {
             "type": "object", "propertyNames": {"pattern": f"^{WORD.pattern}$"}, "minProperties": self.at_least,
             "maxProperties": self.most, "additionalProperties": self.item.schema(),

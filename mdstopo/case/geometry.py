@@ -23,7 +23,7 @@ _BEFORE = ("format", "dimension", "title", "extends", "define", "time", "design"
 
 
 class Geometry(NamedTuple):
-    """How cases of a dimension are read.
+    """What differs between a plane and space where a case is read.
 
     number: 2 or 3; format: the keys of a case. ground: the fixed body.
     coordinates: those that motions prescribe, each with its place in a body's position; None for the angle.
@@ -55,13 +55,14 @@ class Geometry(NamedTuple):
 
 
 def geometry_of(dimension: int) -> Geometry:
-    """The record of a dimension, 2 or 3."""
+    """What a case reader has to know of a plane (2) or of space (3)."""
     geometry: Geometry = resolve_name(_MODULES[dimension])
     return geometry
 
 
 def geometry_in(root: Node, reading: Reading) -> Geometry:
-    """What a case says of its dimension, the plane where it says nothing or a mistake; notes where it says it late."""
+    """The dimension that a case states; the plane where it states none or a mistake. Notes where it is stated too
+    late."""
     entry = root.entries.get("dimension")
     if entry is None:
         return geometry_of(2)

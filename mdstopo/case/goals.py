@@ -29,7 +29,7 @@ DESIGN_DEFAULTS = {"initial": 0.1, "lower": 0.001, "upper": 1.0, "power": 1.0}
 
 
 def apply_design(top: Fields, groups: dict[str, MemberGroup], reading: Reading) -> dict[str, MemberGroup] | None:
-    """The groups with the design's numbers; None where those are wrong.
+    """The groups of members with the numbers of the section `design`; None where those are wrong.
 
     A case without design, objectives and constraints is simulated with alpha = 1: its initial design is 1.
     """
@@ -106,7 +106,7 @@ def _check_numbers(values: dict[str, Any], group: str, design: Fields, reading: 
 
 
 def build_objectives(top: Fields, frames: Frames, reading: Reading) -> tuple[Objective, ...]:
-    """The objectives that can be made."""
+    """The objectives of the case, without those that cannot be made; mistakes are noted."""
     built = []
     for name, fields in (top["objectives"] or {}).items() if top["objectives"] is not BAD else ():
         if fields is BAD:
@@ -148,7 +148,7 @@ def build_constraints(
     frames: Frames,
     reading: Reading,
 ) -> tuple[VolumeRow | ResponseRow, ...]:
-    """The rows that can be made, checked against the bounds. groups: None where members could not be read."""
+    """The constraints of the case, without those that cannot be made, checked against the bounds."""
     built: list[VolumeRow | ResponseRow] = []
     volumes: list[tuple[str, VolumeRow]] = []
     for fields in top["constraints"] if isinstance(top["constraints"], list) else ():

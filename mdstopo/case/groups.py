@@ -48,7 +48,7 @@ class _Pairs(Value):
 def build_groups(
     sections: Any, points: dict[str, PointGrid], frames: Frames, reading: Reading
 ) -> dict[str, MemberGroup]:
-    """The groups that can be made, by name; the design's numbers are filled in later."""
+    """The groups of members by name, without those that cannot be made; the design's numbers are filled in later."""
     groups: dict[str, MemberGroup] = {}
     left = total_memory() // BYTES_PER_MEMBER
     for name, fields in (sections or {}).items():

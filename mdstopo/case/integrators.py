@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class IntegratorKind(NamedTuple):
-    """An integrator.
+    """What is declared of an integrator: its name, where its code is, and what it can do.
 
     name: as case files have it; doc: a sentence for the case reference. made_by: module:function, called with the
     solver's settings, which returns the `integrators.scene_driver.Method`.
@@ -95,5 +95,5 @@ def names(_: bool = False) -> dict[str, str]:
 
 
 def having(capability: str) -> list[str]:
-    """The integrators that have a capability, in words."""
+    """The names of the integrators that have a capability."""
     return [kind.name for kind in INTEGRATORS.values() if getattr(kind, capability)]

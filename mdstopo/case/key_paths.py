@@ -55,7 +55,7 @@ def led_to(stated: str, root: Node) -> tuple[str, Node]:
 
 
 def number_at(node: Node) -> float:
-    """The finite number at a node, else NaN."""
+    """The finite number at a node of the file; NaN where there is none."""
     value = node.scalar() if node.kind == SCALAR else None
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return math.nan
@@ -64,7 +64,7 @@ def number_at(node: Node) -> float:
 
 
 def stands(steps: Sequence[str], root: Node) -> bool:
-    """Whether something stands at a key path."""
+    """Whether the case states anything at a key path."""
     node = root
     for step in steps:
         if node.kind == MAPPING and step in node.entries:
@@ -77,7 +77,7 @@ def stands(steps: Sequence[str], root: Node) -> bool:
 
 
 def varied_by(steps: list[str], root: Node) -> str:
-    """Which design variable decides the parameter of a law that a key path leads to; nothing where none does."""
+    """The name of the design variable that a key path's number of a law is; empty where it is none."""
     for name, node in _variables(root):
         stated = {key: value for key, (_, value) in node.entries.items()}
         if "group" not in stated or "parameter" not in stated or stated["parameter"].text != steps[-1]:
@@ -90,7 +90,7 @@ def varied_by(steps: list[str], root: Node) -> str:
 
 
 def varied_as(word: str, root: Node) -> str:
-    """Which design variable a defined name is; nothing where it is none."""
+    """The name of the design variable that a defined name is; empty where it is none."""
     for name, node in _variables(root):
         stated = node.entries.get("of")
         if stated is not None and stated[1].text == f"define.{word}":
@@ -112,7 +112,8 @@ def _variables(root: Node) -> Iterator[tuple[str, Node]]:
 
 
 def why_fixed(steps: list[str], root: Node, sections: Container[str]) -> str:
-    """Why the number that a key path leads to is none of the scene, but says what the problem is; nothing where it is.
+    """Why the number at a key path may not vary: it says what the problem is, not what the scene is like. Empty
+    where it may.
 
     sections: those of `SECTIONS` in which all numbers are such.
     """

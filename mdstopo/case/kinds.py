@@ -22,7 +22,8 @@ Schema = dict[str, Any]
 
 
 def expressible(kind: str) -> Schema:
-    """A number (or integer) as JSON Schema, or text: an expression (`definitions`), or a quantity with its unit."""
+    """The JSON Schema of a number (or integer), or of text: an expression (`definitions`), or a quantity with its
+    unit."""
     return {"type": [kind, "string"], "pattern": "^\\s*=" if kind == "integer" else f"^\\s*=|{PATTERN}"}
 
 
@@ -31,18 +32,19 @@ TAKEN = ("ground", "all", "default")
 
 
 class Kind(Protocol):
-    """What a value may be."""
+    """The interface of a kind: what a value of the case file may be."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """The value at `node`, or BAD."""
 
     def schema(self) -> Schema:
-        """The same as JSON Schema (draft 2020-12)."""
+        """The JSON Schema (draft 2020-12) of such values."""
 
 
 @frozen
 class Number(Value):
-    """A finite number with limits; `above` and `below` are exclusive. whole: integers only (20.0 is one)."""
+    """The kind of a finite number with limits; `above` and `below` are exclusive. whole: integers only (20.0 is
+    one)."""
 
     minimum: float | None = None
     above: float | None = None
@@ -51,7 +53,7 @@ class Number(Value):
     whole: bool = False
 
     def allowed(self) -> str:
-        """The limits in words."""
+        """The limits of the number in words, for messages."""
         noun = "a whole number" if self.whole else "a number"
         limits = [
             f"{sign} {number_text(limit)}"
@@ -63,7 +65,7 @@ class Number(Value):
         return f"{noun} {' and '.join(limits)}" if limits else noun
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """float (int where whole) or BAD."""
+        """The number at a node (int where it has to be whole), or BAD with a mistake noted."""
         raw: Any = node.scalar() if node.kind == SCALAR else None
         if has_unit(node) and not self.whole:
             raw = with_unit(node, path, reading)
@@ -105,7 +107,7 @@ class Number(Value):
         return ""
 
     def schema(self) -> Schema:
-        """type and limits; text that is an expression."""
+        """The JSON Schema: a number within its limits, or text that is an expression."""
         limits = {
             "minimum": self.minimum,
             "exclusiveMinimum": self.above,
@@ -118,10 +120,10 @@ class Number(Value):
 
 @frozen
 class ScalarInPlane(Number):
-    """A number that is a vector or a tensor in space."""
+    """The kind of a number in a plane which in space is a vector or a tensor."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """float or BAD."""
+        """The number at a node of the file, or BAD with a mistake noted."""
         if node.kind == SEQUENCE:
             words = "; a list is for a case with `dimension: 3`"
             reading.mistake(path, f"found {found(node)}, allowed is {self.allowed()}{words}", node)
@@ -154,10 +156,10 @@ NOT_NEGATIVE = Number(minimum=0)
 
 @frozen
 class Flag(Value):
-    """true or false."""
+    """The kind of a value that is true or false."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """bool or BAD."""
+        """The truth value at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if isinstance(value, bool):
             return value
@@ -165,16 +167,16 @@ class Flag(Value):
         return BAD
 
     def schema(self) -> Schema:
-        """boolean."""
+        """The JSON Schema of a truth value."""
         return {"type": "boolean"}
 
 
 @frozen
 class Text(Value):
-    """Any text."""
+    """The kind of a value that is any text."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD."""
+        """The text at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if isinstance(value, str):
             return value
@@ -183,20 +185,21 @@ class Text(Value):
         return BAD
 
     def schema(self) -> Schema:
-        """string."""
+        """The JSON Schema of a text."""
         return {"type": "string"}
 
 
 @frozen
 class Word(Value):
-    """One of a few words. instead: what is allowed besides, for the message; meanings: what each word means."""
+    """The kind of one of a few words. instead: what is allowed besides, for the message; meanings: what each word
+    means."""
 
     words: tuple[str, ...]
     instead: str = ""
     meanings: tuple[str, ...] = ()
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD."""
+        """The word at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if isinstance(value, str) and value in self.words:
             return value
@@ -206,14 +209,14 @@ class Word(Value):
         return BAD
 
     def schema(self) -> Schema:
-        """enum, with its meanings where editors look for them."""
+        """The JSON Schema: a list of the words, with their meanings where editors look for them."""
         schema: Schema = {"type": "string", "enum": list(self.words)}
         return {**schema, "enumDescriptions": list(self.meanings)} if any(self.meanings) else schema
 
 
 @frozen
 class OpenWord(Word):
-    """One of words to which other distributions may add.
+    """The kind of one of several words to which other distributions may add.
 
     anew (ask) gives them with their meanings; ask: whether distributions are asked for theirs.
     """
@@ -221,48 +224,48 @@ class OpenWord(Word):
     anew: Callable[[bool], Mapping[str, str]] = lambda _: {}
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD."""
+        """The word at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         known = self.words if value in self.words else tuple(self.anew(True))
         return Word(known, self.instead).read(node, path, reading)
 
     def schema(self) -> Schema:
-        """enum, with those of other distributions that have been asked for."""
+        """The JSON Schema: a list of the words, with those of other distributions that have been asked for."""
         return explained(self.anew(False), self.instead).schema()
 
 
 def explained(meanings: Mapping[str, str], instead: str = "") -> Word:
-    """One of the words that `meanings` explains."""
+    """The kind of a value that is one of the words which `meanings` explains."""
     return Word(tuple(meanings), instead, tuple(meanings.values()))
 
 
 @frozen
 class NumberOrWord(Value):
-    """A number, or one of a few words."""
+    """The kind of a value that is a number, or one of a few words."""
 
     number: Number
     word: Word
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """float, str or BAD."""
+        """The number or the word at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return self.number.read(node, path, reading)
         return self.word.read(node, path, reading)
 
     def schema(self) -> Schema:
-        """Either."""
+        """The JSON Schema of a number or one of the words."""
         return {"anyOf": [self.number.schema(), self.word.schema()]}
 
 
 @frozen
 class Version(Value):
-    """The number of the format."""
+    """The kind of the number of the format, of which only some can be read."""
 
     number: int
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """int or BAD."""
+        """The number of the format at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if not isinstance(value, bool) and value == self.number:
             return self.number
@@ -271,18 +274,18 @@ class Version(Value):
         return BAD
 
     def schema(self) -> Schema:
-        """const."""
+        """The JSON Schema: the one number that is allowed."""
         return {"const": self.number}
 
 
 @frozen
 class OneOf(Value):
-    """One of a few whole numbers."""
+    """The kind of a value that is one of a few whole numbers."""
 
     numbers: tuple[int, ...]
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """int or BAD."""
+        """The whole number at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if not isinstance(value, (bool, str)) and value in self.numbers:
             return self.numbers[self.numbers.index(int(value or 0))]
@@ -291,13 +294,14 @@ class OneOf(Value):
         return BAD
 
     def schema(self) -> Schema:
-        """enum."""
+        """The JSON Schema: a list of the numbers that are allowed."""
         return {"enum": list(self.numbers)}
 
 
 @frozen
 class Ref(Value):
-    """A name declared elsewhere (see `Reading.declare`). also: words with a meaning of their own.
+    """The kind of a name that is declared elsewhere (see `Reading.declare`). also: words with a meaning of their
+    own.
 
     index: an index may stand for the name.
     """
@@ -307,7 +311,7 @@ class Ref(Value):
     index: bool = False
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD; whether the name is declared is checked once all are known."""
+        """The name at a node, or BAD; whether it is declared is checked once all names are known."""
         value = node.scalar() if node.kind == SCALAR else None
         if self.index and isinstance(value, int) and not isinstance(value, bool):
             value = str(value)
@@ -320,24 +324,24 @@ class Ref(Value):
         return value
 
     def schema(self) -> Schema:
-        """string, or an index."""
+        """The JSON Schema of a reference: a name, or a place in a list where that is allowed."""
         text = {"type": "string", "description": f"name of a {self.kind}"}
         return {"anyOf": [text, {"type": "integer", "minimum": 0}]} if self.index else text
 
 
 @frozen
 class Name(Value):
-    """A new name."""
+    """The kind of a new name, which nothing in the case has as yet."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD."""
+        """The name at a node of the file, or BAD with a mistake noted."""
         if node.kind != SCALAR:
             reading.mistake(path, f"found {found(node)}, allowed is a name", node)
             return BAD
         return node.text if check_name(node, path, reading) else BAD
 
     def schema(self) -> Schema:
-        """A string of the right characters that is not taken."""
+        """The JSON Schema: a text of the characters that names may have."""
         return {"type": "string", "pattern": f"^{NAME.pattern}$", "not": {"enum": list(TAKEN)}}
 
 

@@ -33,7 +33,7 @@ def declare_joints(entries: Any, reading: Reading) -> None:
 
 
 def build_joints(entries: Any, frames: Frames, reading: Reading) -> tuple[Joint, ...]:
-    """The joints that can be made."""
+    """The joints of the case, without those that cannot be made; mistakes are noted."""
     built = []
     for index, fields in enumerate(entries if isinstance(entries, list) else ()):
         joint = None if fields is BAD else _build_joint(index, fields, frames, reading)
@@ -43,7 +43,7 @@ def build_joints(entries: Any, frames: Frames, reading: Reading) -> tuple[Joint,
 
 
 def build_bushings(entries: Any, frames: Frames, reading: Reading) -> tuple[Bushing, ...]:
-    """The bushings that can be made."""
+    """The bushings of the case, without those that cannot be made; mistakes are noted."""
     built = []
     for index, fields in enumerate(entries if isinstance(entries, list) else ()):
         if fields is BAD:

@@ -28,7 +28,7 @@ class Window:
 
 
 def windows(top: Fields, reading: Reading) -> dict[str, Window]:
-    """Start and end of every load case (`default` where there are none), own times before common ones."""
+    """Start and end of every load case (of `default` where there are none); its own times come before common ones."""
     time = top["time"]
     common_start, common_end = (BAD, BAD) if time is BAD else (time["start"], time["end"])
     found: dict[str, Window] = {}
@@ -62,7 +62,7 @@ def build_load_cases(
     frames: Frames,
     reading: Reading,
 ) -> tuple[LoadCase, ...]:
-    """The load cases that can be made.
+    """The load cases of the case, without those that cannot be made; mistakes are noted.
 
     top: the whole file.
     times: when each load case runs, by its name.
@@ -105,7 +105,7 @@ def _check_weights(gravity: Components, frames: Frames, path: str, reading: Read
 
 
 def build_loads(entries: Any, frames: Frames, reading: Reading) -> tuple[Load, ...]:
-    """The loads that can be made."""
+    """The loads of a section, without those that cannot be made; mistakes are noted."""
     built = []
     for fields in entries if isinstance(entries, list) else ():
         load = None if fields is BAD else _build_load(fields, frames, reading)
@@ -135,7 +135,7 @@ def scaled(signals: VectorSignal, factor: float, path: str, reading: Reading) ->
 
 
 def times_of(signal: Signal, factor: float) -> Signal:
-    """A signal times a factor."""
+    """A signal with all its values multiplied by a factor."""
     if isinstance(signal, TimeFormula):
         return signal.times(factor)
     return Table(signal.times, signal.values * factor) if isinstance(signal, Table) else signal * factor

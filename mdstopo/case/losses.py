@@ -39,5 +39,5 @@ DEFAULT_LOSS = next(iter(LOSSES))
 
 
 def names() -> dict[str, str]:
-    """The words of `fit.loss` with what they mean."""
+    """The losses by the words of `fit.loss`, with what they mean."""
     return {kind.name: kind.doc for kind in LOSSES.values()}

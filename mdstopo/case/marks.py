@@ -12,7 +12,7 @@ from mdstopo.case.value import Value, frozen
 
 @frozen
 class Marks(Value):
-    """Where each key of the file stands: key path -> (line, column), both from 1.
+    """Where in the file each key stands, for messages: key path -> (line, column), both from 1.
 
     origins: key path -> ``--set KEY`` for values that came from outside the file.
     """

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class MeasureKind(NamedTuple):
-    """A measure: one number of the values at all points of a sample.
+    """What is declared of a measure, which is one number of the values at all points of a sample.
 
     name: as case files have it; doc: a sentence for the case reference. made_by: module:class, derived from
     `robust.robust_measures.Statistic`; empty where the value of the case as it is written is taken instead, and no
@@ -64,10 +64,10 @@ OF_OBJECTIVES, OF_LIMITS = "mean", "worst"
 
 
 def names() -> dict[str, str]:
-    """The measures with what they are."""
+    """The measures by their names, with what they mean."""
     return {kind.name: kind.doc for kind in MEASURES.values()}
 
 
 def having(key: str) -> list[str]:
-    """The measures of which a key is part."""
+    """The names of the measures to which a key belongs."""
     return [kind.name for kind in MEASURES.values() if key in kind.keys]

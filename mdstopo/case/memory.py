@@ -31,11 +31,12 @@ def total_memory() -> int:
 
 
 def most_floats() -> int:
-    """How many numbers the steps of one simulation may be."""
+    """How many numbers the history of the steps of one simulation may have."""
     return total_memory() // (8 * SHARE_OF_STEPS)
 
 
 def room_factor(floats: int) -> float:
-    """By how much the room for steps, so many numbers, grows when it is full: at most 2; 1 where memory ends."""
+    """By how much the arrays for steps, of so many numbers, grow when they are full: at most twofold; 1 where memory
+    ends."""
     factor = min(2.0, most_floats() / floats)
     return factor if factor >= WORTH else 1.0

@@ -31,7 +31,7 @@ class MeshFile(FileName):
     """The path of an STL or OBJ file, relative to the case file: its vertices, each once, in the file's order."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """(n, 3) array or BAD."""
+        """Points (n, 3) of the file that a node names, or BAD with a mistake noted."""
         name = super().read(node, path, reading)
         if name is BAD:
             return BAD
@@ -49,7 +49,7 @@ class MeshFaces(FileName):
     """The path of an STL or OBJ file, relative to the case file: its faces."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """(corners (n, 3), faces, sharp edges) or BAD."""
+        """Corners (n, 3), faces and sharp edges of the mesh in the file, or BAD with a mistake noted."""
         name = super().read(node, path, reading)
         if name is BAD:
             return BAD

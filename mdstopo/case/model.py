@@ -144,7 +144,7 @@ __all__ = [
 
 @frozen
 class Case(Value):
-    """One design problem.
+    """One design problem as read from a file, in SI units.
 
     text, sha256: the YAML as read and its hash; overrides: keys set from outside, key path -> value in YAML;
     files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
@@ -208,7 +208,7 @@ class Case(Value):
 
     @property
     def n_members(self) -> int:
-        """Members of all groups."""
+        """The number of members of all groups, designed or not."""
         return sum(len(group) for group in self.members)
 
     @property
@@ -218,7 +218,7 @@ class Case(Value):
 
     @property
     def group_slices(self) -> dict[str, slice]:
-        """Design group -> its slice of the design vector."""
+        """By name of a design group, the slice of the design vector that its members have."""
         slices: dict[str, slice] = {}
         first = 0
         for group in self.design_groups:
@@ -233,13 +233,13 @@ class Case(Value):
 
     @property
     def space(self) -> DesignSpace:
-        """What the optimiser's variables stand for."""
+        """The map from the optimiser's variables to alpha and the values of variables."""
         counts = {group.name: len(group) for group in self.design_groups}
         return DesignSpace(self.n_design, slots_of(counts, self.shared, self.mirrored), self.variables)
 
     @property
     def defined_variables(self) -> tuple[Variable, ...]:
-        """The variables that are names in `define`."""
+        """The design variables that are names in `define`."""
         return tuple(each for each in self.variables if each.defined)
 
     @property
@@ -255,27 +255,28 @@ class Case(Value):
 
     @property
     def lower(self) -> FloatArray:
-        """(N,) lower bounds."""
+        """(N,) lower bounds of alpha."""
         return self._per_member("lower")
 
     @property
     def upper(self) -> FloatArray:
-        """(N,) upper bounds."""
+        """(N,) upper bounds of alpha."""
         return self._per_member("upper")
 
     @property
     def power(self) -> FloatArray:
-        """(N,) mu of Eq. 12."""
+        """(N,) exponents of alpha in the forces: mu of Eq. 12."""
         return self._per_member("power")
 
     @property
     def cost(self) -> FloatArray:
-        """(N,) V_i of Eq. 14."""
+        """(N,) what one unit of each alpha adds to a volume: V_i of Eq. 14."""
         groups = self.design_groups
         return read_only(np.concatenate([g.cost for g in groups]) if groups else np.zeros(0))
 
     def whole(self, design: FloatArray) -> FloatArray:
-        """A design (N + P,): from alpha (N,), with the initial values of variables behind it; a whole one as it is."""
+        """The whole design (N + P,) from alpha (N,), with the initial values of variables behind it; a whole one as it
+        is."""
         if self.variables and design.shape == (self.n_design,):
             return np.concatenate([design, self.start[self.n_design :]])
         return design

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @frozen
 class Start(Value):
-    """What motions prescribe at the start; None where they do not. velocity: by coordinate.
+    """What a motion prescribes at the start: position and velocity, None where it does not. velocity: by coordinate.
 
     angular_velocity: a number in the plane, three in space.
     """
@@ -33,7 +33,7 @@ class Start(Value):
 
 
 def merged(top: Fields, reading: Reading) -> dict[str, dict[str, Fields]]:
-    """Load case -> body -> its motion as read: the common one, or the load case's own in its place, whole."""
+    """By load case and body, the body's motion as read: the common one, or in its place the load case's own."""
     common = _by_body(top["motions"], reading)
     cases = top["load_cases"]
     if cases is BAD or not cases:
@@ -61,7 +61,7 @@ def _by_body(entries: Any, reading: Reading) -> dict[str, Fields]:
 
 
 def build_motions(by_body: dict[str, Fields], geometry: Geometry) -> tuple[Motion, ...]:
-    """The motions that can be made."""
+    """The prescribed motions of a section, without those that cannot be made; mistakes are noted."""
     built = []
     for body, fields in by_body.items():
         if fields.good():
@@ -79,7 +79,7 @@ def resolve_starts(
     geometry: Geometry,
     reading: Reading,
 ) -> dict[tuple[str, str], Start]:
-    """(load case, body) -> what is prescribed at the start; notes what does not agree with the body."""
+    """By (load case, body), what motions prescribe at the start; notes what does not agree with the body."""
     starts: dict[tuple[str, str], Start] = {}
     bodies = top["bodies"]
     if bodies is BAD:

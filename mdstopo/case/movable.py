@@ -43,7 +43,7 @@ def build_movable(
     frames: Frames,
     reading: Reading,
 ) -> tuple[tuple[MovablePoints, ...], tuple[Variable, ...]]:
-    """The points that may move, and the variables that their coordinates are; notes what is wrong."""
+    """The points that may move, and the variables that their coordinates are; mistakes are noted."""
     sections = top["points"] if isinstance(top["points"], dict) else {}
     moving: list[MovablePoints] = []
     variables: list[Variable] = []
@@ -77,14 +77,14 @@ def build_movable(
 
 
 def turned(frames: Frames, body: str, vectors: FloatArray) -> FloatArray:
-    """Global vectors (n, d) as components along the axes of a body."""
+    """Vectors (n, d), stated in global axes, in the axes of a body at the start."""
     if body == GROUND:
         return vectors
     return frames.geometry.to_local(_at_origin(frames.bodies[body]), vectors)
 
 
 def turned_out(frames: Frames, body: str, vectors: FloatArray) -> FloatArray:
-    """Vectors (n, d) of a body as global ones."""
+    """Vectors (n, d), stated in the axes of a body at the start, in global axes."""
     if body == GROUND:
         return vectors
     return frames.geometry.to_world(_at_origin(frames.bodies[body]), vectors)
@@ -155,7 +155,8 @@ def _values(name: str, points: FloatArray, region: _Region, path: str, reading: 
 
 
 def is_of_use(name: str, path: str, top: Fields, groups: dict[str, MemberGroup] | None, reading: Reading) -> bool:
-    """Whether members end at the points of a grid, and nothing that cannot follow them does; notes what does."""
+    """Whether members end at the points of a grid, and nothing else that could not follow them is tied to these; notes
+    what is."""
     contacts = top["contacts"] if isinstance(top["contacts"], (list, tuple)) else ()
     touching = [i for i, each in enumerate(contacts) if each is not BAD and each["points"] == name]
     if touching:
@@ -183,7 +184,7 @@ def points_at(case: Case, values: Mapping[str, FloatArray]) -> dict[str, FloatAr
 
 
 def placed(case: Case, design: FloatArray) -> Case:
-    """The case with points where a design (N + P,) has them, its variables beginning there."""
+    """The case with movable points where a design (N + P,) has them, which is where its variables then begin."""
     if not case.movable:
         return case
     frames = frames_of(case)
@@ -205,7 +206,8 @@ def placed(case: Case, design: FloatArray) -> Case:
 
 
 def with_points_fixed(case: Case, design: FloatArray) -> tuple[Case, FloatArray]:
-    """The case with points where a design (N + P,) has them, and no variables any more; and the design without them."""
+    """The case with movable points where a design (N + P,) has them and no variables for them any more; and the design
+    without them."""
     if not case.movable:
         return case, design
     there = placed(case, design)

@@ -42,7 +42,8 @@ class _Written(NamedTuple):
 
 
 def build_named(name: str, fields: Fields, top: Fields, reading: Reading) -> Variable | None:
-    """The variable of a defined name, before it is known what follows from it; None where there is none, noted."""
+    """The design variable that a defined name is, before it is known what follows from it; None where there is none,
+    which is noted."""
     word, path = fields["of"], fields.path
     numbers = top[SECTION] if isinstance(top[SECTION], dict) else {}
     if word not in numbers:
@@ -74,7 +75,7 @@ def build_follows(
     taken: Mapping[tuple[str, int, str], str],
     reading: Reading,
 ) -> tuple[list[Variable], Follows | None]:
-    """The variables of names, with what they reach, and what follows from them; None where that is refused.
+    """The variables that are defined names, and the numbers that follow from them; None where that is refused.
 
     named: the variables. written: the whole case with its expressions.
     top, groups: the case as read, and its groups by name.
@@ -135,8 +136,8 @@ def what_follows(written: Node) -> tuple[list[str], dict[str, float | str]]:
 
 
 def laws_that_follow(written: Node, words: Sequence[str]) -> tuple[Expressions, list[tuple[str, int, str]], list[str]]:
-    """Numbers of laws as functions of some defined names: their expressions, and group, place and parameter, and key
-    path of each.
+    """The numbers of laws that are functions of some defined names: their expressions; group, law and parameter; key
+    path.
 
     written: a case that has been read, with its expressions.
     """
@@ -286,7 +287,7 @@ def _are_within(
 
 
 def why_not_allowed(value: float, field: Field[Any]) -> str:
-    """Why a parameter of a law may not be this number; nothing where it may."""
+    """Why a parameter of a law may not be this number; empty where it may."""
     kind = field.metadata["kind"]
     above = field.metadata.get("varies_above", kind.above)
     low = (above is not None and value <= above) or (kind.minimum is not None and value < kind.minimum)

@@ -20,7 +20,7 @@ MOST_EXPANDED = 5_000_000
 
 
 class Node:
-    """A located YAML node.
+    """A value of a YAML file with its place (line and column).
 
     kind: SCALAR (`text`, `plain`), SEQUENCE (`items`) or MAPPING (`entries`: key -> (key node, value node),
     merge keys applied). line, column: from 1. origin: as in `Mistake`. size: nodes below and itself, aliases
@@ -43,7 +43,7 @@ class Node:
         self.source = ""
 
     def at(self, line: int, column: int) -> Node:
-        """The same value at another place: what an alias stands for. Children are shared."""
+        """The same value at another place in the file: what an alias stands for. Children are shared."""
         twin = Node(self.kind, line, column, self.origin)
         twin.text, twin.plain, twin.size, twin.source = self.text, self.plain, self.size, self.source
         twin.items, twin.entries = self.items, self.entries

@@ -71,7 +71,7 @@ class Normal(Distribution):
 
     @classmethod
     def made(cls, stated: Any, nominal: float, path: str, reading: Reading) -> Distribution | None:
-        """See `Distribution.made`."""
+        """The distribution from its keys; see `Distribution.made`."""
         mean = nominal if stated["mean"] is None else stated["mean"]
         low, high = stated["from"], stated["to"]
         if low is not None and high is not None and not _rises(low, high, path, reading):
@@ -83,7 +83,7 @@ class Normal(Distribution):
         return cls(mean, stated["deviation"], low, high)
 
     def quantile(self, u: float) -> float:
-        """See `Distribution.quantile`."""
+        """The value that a share u of all lies below; see `Distribution.quantile`."""
         from statistics import NormalDist
 
         standard = NormalDist()
@@ -114,7 +114,7 @@ class Lognormal(Distribution):
 
     @classmethod
     def made(cls, stated: Any, nominal: float, path: str, reading: Reading) -> Distribution | None:
-        """See `Distribution.made`."""
+        """The distribution from its keys; see `Distribution.made`."""
         mean = nominal if stated["mean"] is None else stated["mean"]
         if mean <= 0.0:
             reading.mistake(path, f"found the mean {number_text(mean)}, allowed is a number > 0")
@@ -122,7 +122,7 @@ class Lognormal(Distribution):
         return cls(mean, stated["deviation"])
 
     def quantile(self, u: float) -> float:
-        """See `Distribution.quantile`."""
+        """The value that a share u of all lies below; see `Distribution.quantile`."""
         from statistics import NormalDist
 
         square = math.log1p((self.deviation / self.mean) ** 2)
@@ -149,17 +149,17 @@ class Uniform(Distribution):
 
     @classmethod
     def made(cls, stated: Any, nominal: float, path: str, reading: Reading) -> Distribution | None:
-        """See `Distribution.made`."""
+        """The distribution from its keys; see `Distribution.made`."""
         return cls(stated["from"], stated["to"]) if _rises(stated["from"], stated["to"], path, reading) else None
 
     def quantile(self, u: float) -> float:
-        """See `Distribution.quantile`."""
+        """The value that a share u of all lies below; see `Distribution.quantile`."""
         return (1.0 - u) * self.low + u * self.high
 
 
 @frozen
 class Discrete(Distribution):
-    """A few values; probabilities: of sum 1."""
+    """A few values, each with its probability; the probabilities have the sum 1."""
 
     type: ClassVar[str] = "discrete"
     doc: ClassVar[str] = "a few values, each with its probability, of sum 1"
@@ -170,7 +170,7 @@ class Discrete(Distribution):
 
     @classmethod
     def made(cls, stated: Any, nominal: float, path: str, reading: Reading) -> Distribution | None:
-        """See `Distribution.made`."""
+        """The distribution from its table; see `Distribution.made`."""
         values, shares = stated[:, 0].tolist(), stated[:, 1].tolist()
         if min(shares) < 0.0 or abs(math.fsum(shares) - 1.0) > ROUNDED:
             total = number_text(math.fsum(shares))
@@ -179,7 +179,7 @@ class Discrete(Distribution):
         return cls(tuple(values), scaled_to_one(shares))
 
     def quantile(self, u: float) -> float:
-        """See `Distribution.quantile`; values count in the order in which they are given."""
+        """The value that a share u of all lies below; values count in the order in which they are given."""
         below = 0.0
         for value, share in zip(self.values, self.probabilities, strict=True):
             below += share
@@ -189,7 +189,15 @@ class Discrete(Distribution):
 
 
 #: the distributions by their key
-DISTRIBUTIONS: dict[str, type[Distribution]] = {cls.type: cls for cls in (Normal, Lognormal, Uniform, Discrete)}
+DISTRIBUTIONS: dict[str, type[Distribution]] = {
+    cls.type: cls
+    for cls in (
+        Normal,
+        Lognormal,
+        Uniform,
+        Discrete,
+    )
+}
 
 
 def scaled_to_one(shares: Sequence[float]) -> tuple[float, ...]:

@@ -24,10 +24,10 @@ MOST_TOLD = 10
 
 @frozen
 class FileName(Value):
-    """The path of a file, relative to the case file."""
+    """The kind of a path of a file, relative to the case file."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD."""
+        """The path at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if isinstance(value, str) and value and "\0" not in value:
             return value
@@ -35,7 +35,7 @@ class FileName(Value):
         return BAD
 
     def schema(self) -> Schema:
-        """string."""
+        """The JSON Schema: a text that is not empty."""
         return {"type": "string", "minLength": 1}
 
 
@@ -48,7 +48,7 @@ FILE = Record(
 
 @frozen
 class Rows(Value):
-    """Rows of finite numbers, or {file: path} with such rows.
+    """The kind of a table: rows of finite numbers, or {file: path} of a file with such rows.
 
     columns: what stands in each. order of the first column: ``time`` (may not fall, two rows at most share a
     value), ``rising`` (no repeats), ``free``. at_least: how many rows are needed.
@@ -60,11 +60,11 @@ class Rows(Value):
 
     @property
     def row_text(self) -> str:
-        """A row in words."""
+        """The columns of a row in words, for messages."""
         return f"[{', '.join(self.columns)}]"
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """(n, columns) array or BAD."""
+        """The table (n, columns) at a node of the file, or BAD with a mistake noted."""
         if node.kind == SEQUENCE:
             return self._listed(node, path, reading)
         if node.kind == MAPPING:
@@ -189,7 +189,7 @@ class Rows(Value):
         return values
 
     def schema(self) -> Schema:
-        """array of rows, or a file."""
+        """The JSON Schema: rows of numbers, or the name of a file with them."""
         width = len(self.columns)
         row = {"type": "array", "items": expressible("number"), "minItems": width, "maxItems": width}
         title = f"rows {self.row_text}"
@@ -234,7 +234,7 @@ def rows_in(text: str) -> list[list[float]]:
 
 @frozen
 class Signals(Value):
-    """Quantities over time: constants, or a table of time.
+    """The kind of quantities over time: constants, a table, or formulas.
 
     One quantity: a number, {table: rows} or the rows. Two: a list of two such values, {table: rows [t, x, y]}
     or the rows. Read as a tuple with one Signal for each name (or BAD). constant: whether a number will do;
@@ -249,17 +249,17 @@ class Signals(Value):
 
     @property
     def rows(self) -> Rows:
-        """A table of all quantities."""
+        """The kind of a table whose rows are a time and the values of all quantities."""
         return Rows(("t", *self.names), self.order, self.at_least)
 
     @property
     def table(self) -> Record:
-        """{table: rows}."""
+        """The kind of a mapping with the key `table`, whose value are rows of a time and the quantities."""
         rows = Key("table", self.rows, f"rows {self.rows.row_text}, linear between them", True)
         return Record("a table of time", (rows,), doc="A quantity over time.")
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """tuple[Signal, ...] or BAD."""
+        """The quantities over time at a node of the file, a signal each, or BAD with a mistake noted."""
         if self.formula and (is_formula(node) or self._is_text(node)):
             number = "a number, " if self.constant else ""
             instead = f"allowed is {number}an expression of t, or {{table: rows {self.rows.row_text}}}"
@@ -307,7 +307,7 @@ class Signals(Value):
         return tuple(Table(times, values[:, column : column + 1]) for column in range(1, values.shape[1]))
 
     def schema(self) -> Schema:
-        """Constant, table or rows."""
+        """The JSON Schema: a constant, a table of time, or formulas."""
         tables = [self.table.schema(), self.rows.schema()]
         if self.formula:
             tables.append(formula_record(self.names).schema())

@@ -65,18 +65,18 @@ def _flat(corners: FloatArray) -> bool:
 
 
 def loop(count: int, first: int = 0) -> tuple[int, ...]:
-    """The numbers of the corners of a closed line."""
+    """The numbers of the corners of a closed line: `count` of them, from `first` on."""
     return tuple(range(first, first + count))
 
 
 def polygon(corners: FloatArray, middle: FloatArray) -> tuple[FloatArray, Faces, Faces]:
-    """A closed line, as stated."""
+    """A polygon through corners (n, 2) as they are stated: its points, its one face, and no further edges."""
     del middle
     return corners, (loop(len(corners)),), ()
 
 
 def centre_of(keys: Any, middle: FloatArray) -> FloatArray:
-    """Where a shape stands: as stated, or at the middle of the body."""
+    """The centre of a shape: as stated, or else the middle of the body."""
     return middle if keys["center"] is None else np.array(keys["center"])
 
 

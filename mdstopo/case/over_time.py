@@ -56,7 +56,7 @@ class ReductionKind(NamedTuple):
 
     @property
     def ignores_sign(self) -> bool:
-        """Whether g and -g have the same."""
+        """Whether g and -g have the same number."""
         return self.is_magnitude or self.is_squared
 
     def unit_from(self, unit: str) -> str:
@@ -98,5 +98,5 @@ DEFAULT_REDUCTION = next(iter(REDUCTIONS))
 
 
 def names() -> dict[str, str]:
-    """The words of `over_time` with what they mean."""
+    """The reductions by the words of `over_time`, with what they mean."""
     return {kind.name: kind.doc for kind in REDUCTIONS.values()}

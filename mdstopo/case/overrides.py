@@ -40,7 +40,7 @@ def apply_overrides(
 
 
 class WrongPathError(Exception):
-    """A key path that leads nowhere."""
+    """A key path does not lead to anything in the case."""
 
     def __init__(self, path: str, message: str) -> None:
         self.path = path
@@ -79,7 +79,8 @@ def _value(value: Any, report: Callable[[Mistake], None], origin: str) -> Node:
 
 
 def node_of(value: Any, origin: str, depth: int = 0) -> Node:
-    """The node that means a Python value: number, text, boolean, None, list, mapping, numpy's like of it."""
+    """The node of a file that a Python value (number, text, boolean, None, list, mapping, or numpy's like of it) would
+    be."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping) and depth < 20:

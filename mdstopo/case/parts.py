@@ -22,7 +22,7 @@ from mdstopo.case.value import Value, frozen
 
 @frozen
 class Outline(Value):
-    """What pictures show of a body; nothing is computed from it.
+    """The outline by which pictures show a body; nothing is computed from it.
 
     shape: the word of the case. corners (n, 2), in space (n, 3): in body coordinates. faces: numbers of corners; in the
     plane each is a closed line, and what lies within two of them is a hole; in space each is a flat piece of the
@@ -143,7 +143,8 @@ class Candidates(Value):
 
 @frozen
 class MemberGroup(Value):
-    """A group of M candidate members between two bodies, filters applied, P slow and Q fast.
+    """A group of M candidate members between two bodies, after filters; first ends vary slowest
+    (`MemberGroup.is_product`).
 
     from_local (nP, 2), to_local (nQ, 2): the end points in body coordinates, each stored once, (n, 3) in space;
     from_world, to_world: the same in the global frame at the start.
@@ -183,7 +184,7 @@ class MemberGroup(Value):
     prices: tuple[float, ...] = ()
 
     def cost_varies(self, movable: Container[str]) -> bool:
-        """Whether the V_i are lengths that vary where the points of these grids move."""
+        """Whether the costs V_i are lengths that change where the points of these grids move."""
         return self.cost_by_length and (self.from_points in movable or self.to_points in movable)
 
     def __post_init__(self) -> None:
@@ -246,7 +247,8 @@ class Load(Value):
 
 @frozen
 class Prescribed(Value):
-    """One prescribed coordinate. kind: acceleration | velocity | position (its signal is always a Table)."""
+    """One coordinate that is prescribed over time. kind: acceleration | velocity | position (its signal is always a
+    Table)."""
 
     kind: str
     signal: Signal
@@ -266,7 +268,7 @@ class PrescribedRotation(Value):
 
     @property
     def signals(self) -> VectorSignal:
-        """All of its quantities over time."""
+        """The signals of all quantities that say how the rotation goes over time."""
         return (*(angle.signal for angle in self.angles), *self.angular_velocity)
 
 
@@ -371,7 +373,7 @@ class Bushing(Value):
 
 @frozen
 class LoadCase(Value):
-    """One loading, common part and own part merged.
+    """One load case: loads, motions, start velocities and times, the common ones merged with its own.
 
     gravity in m/s^2; start, end in s. bodies: `Case.bodies` as this loading starts them: a start value that a
     body does not state and a motion prescribes is taken from the motion (else equal to `Case.bodies`).

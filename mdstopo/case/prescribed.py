@@ -44,7 +44,7 @@ def size_of(signal: Signal) -> float:
 
 
 def prescribed(fields: Fields | None) -> Prescribed | None:
-    """What keys prescribe, of which one is acceleration, velocity or position; None of nothing."""
+    """What the keys of a motion prescribe: its acceleration, velocity or position; None where no key is stated."""
     if fields is None:
         return None
     kind = next(kind for kind in KINDS if kind in fields.stated)
@@ -52,7 +52,8 @@ def prescribed(fields: Fields | None) -> Prescribed | None:
 
 
 def rate_at_start(signal: Signal, window: Window, path: str, reading: Reading) -> tuple[float, float] | None:
-    """A velocity at the start, and its size; None where a formula has no value, which is noted at `path`."""
+    """A prescribed velocity at the start, and its largest size; None where a formula has no value, which is noted at
+    `path`."""
     rate = value_at(signal, window.start)
     if not math.isfinite(rate):
         reading.mistake(path, f"the expression has no value at the start, {number_text(window.start)} s")
@@ -61,7 +62,7 @@ def rate_at_start(signal: Signal, window: Window, path: str, reading: Reading) -
 
 
 def position_at_start(signal: Signal, window: Window, path: str, reading: Reading) -> tuple[float, float, float] | None:
-    """Value and rate at the start of positions, and by how much they change per second.
+    """A prescribed position and its rate at the start, and by how much positions change per second.
 
     None where a table does not cover the simulated time, or is too steep, or a formula has no value, which is noted at
     `path`.

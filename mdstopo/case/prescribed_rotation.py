@@ -20,7 +20,7 @@ ANGLES = ("roll", "pitch", "yaw")
 
 
 def prescribed_rotation(fields: Fields) -> PrescribedRotation | None:
-    """What its keys say; None where they do not go together, which has been noted."""
+    """The rotation that the keys of a motion prescribe; None where they do not go together, which has been noted."""
     if fields["angular_velocity"] is not None:
         return PrescribedRotation(angular_velocity=fields["angular_velocity"])
     if fields["axis"] is not None:

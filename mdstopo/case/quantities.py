@@ -25,7 +25,7 @@ _PREFIXES = {"n": -9, "u": -6, "µ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 
 
 
 class Unit(NamedTuple):
-    """What a unit is of SI, times pi to a power (degrees, turns), and its dimension."""
+    """A unit of measurement: its factor to SI units, a power of pi in it (degrees, turns), and its dimension."""
 
     factor: Fraction
     dimension: Dimension = (0, 0, 0)
@@ -95,7 +95,7 @@ def in_si(text: str, needed: str) -> float:
 
 @functools.cache
 def unit_of(text: str) -> Unit:
-    """The unit that a text is. Raises QuantityError, which names what is not known."""
+    """The unit that a text means. Raises QuantityError, which names what is not known."""
     from fractions import Fraction
 
     factor, dimension, turns, at = Fraction(1), (0, 0, 0), 0, 0
@@ -132,7 +132,7 @@ def _named(name: str) -> Unit:
 
 
 def unit_at(stated: str, path: str) -> str:
-    """The unit of the number at a key path; stated: what its key says of units, of which there may be several.
+    """The unit of the number at a key path, where its key states several units for several numbers.
 
     `N/m, N/m, N m/rad` and `m and N` go by the place in a list, `m or rad` by whether an angle is meant.
     """

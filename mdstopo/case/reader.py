@@ -118,11 +118,11 @@ class Document:
 
     @property
     def written(self) -> Node:
-        """The whole document with its expressions."""
+        """The whole document as it was written, with its expressions."""
         return self._written
 
     def case(self, without: tuple[str, ...] = (), at: Mapping[str, float] | None = None) -> Case:
-        """The case; without: sections that are not read. at: by key path, numbers in the place of what stands there.
+        """The case of the document, perhaps at other numbers.
 
         Raises CaseError as `load_case`.
         """
@@ -160,7 +160,7 @@ class Document:
 
 
 def measured(root: Node) -> dict[str, float]:
-    """By their key path, the SI values of all numbers of a case's document that are written with a unit."""
+    """By key path, the SI values of all numbers of a document that are written with a unit."""
     reading = Reading(Path())
     geometry_in(root, reading).format.read(root, "", reading)
     return reading.measured

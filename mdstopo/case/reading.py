@@ -43,7 +43,7 @@ class Fields(dict[str, Any]):
 
 
 def is_good(value: Any) -> bool:
-    """Whether no part of what was read is BAD."""
+    """Whether a value and all that it contains could be read."""
     if isinstance(value, dict):
         return all(is_good(part) for part in value.values())
     if isinstance(value, (list, tuple)):
@@ -60,7 +60,8 @@ class Reference(NamedTuple):
 
 
 class Reading:
-    """One reading of one file. folder: where relative paths of included files start."""
+    """One reading of one file: the mistakes, remarks and names found so far. folder: where relative paths of included
+    files start."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -81,14 +82,14 @@ class Reading:
         self._ignored: set[tuple[int, int, str]] = set()
 
     def again(self) -> Reading:
-        """A reading of the same file that goes on from here; what it notes is its own."""
+        """A reading of the same file that goes on from here, with mistakes of its own."""
         other = Reading(self.folder)
         other.mistakes, other.warnings, other.files = [*self.mistakes], [*self.warnings], dict(self.files)
         other._ignored, other._included = set(self._ignored), self._included
         return other
 
     def mark(self, path: str, node: Node, key: Node | None = None) -> None:
-        """Note the place of `path`: its value's, or its key's where the value begins on a later line."""
+        """Note where in the file the value of `path` stands, or its key where the value begins on a later line."""
         at = key if key is not None and (key.line != node.line or key.origin != node.origin) else node
         if node.origin:
             self._origins[path] = node.origin
@@ -100,7 +101,7 @@ class Reading:
         return path in self._places or path in self._origins
 
     def marks(self) -> Marks:
-        """Every place noted."""
+        """Where in the file each key path stands, for messages that come later."""
         return Marks(FrozenDict(self._places), FrozenDict(self._origins))
 
     def mistake(self, path: str, message: str, node: Node | None = None) -> None:
@@ -117,7 +118,7 @@ class Reading:
         self._ignored.add((node.line, node.column, node.origin))
 
     def warning(self, path: str, message: str) -> None:
-        """Note a remark at `path`."""
+        """Note at `path` what is no mistake and the user should know."""
         self.warnings.append(self._located(path, message, None))
 
     def _located(self, path: str, message: str, node: Node | None) -> Mistake:
@@ -130,7 +131,8 @@ class Reading:
         return Mistake(path, message, line, column, self._origins.get(at, ""))
 
     def check_references(self) -> None:
-        """Every reference names something declared, or is a mistake with the nearest right word."""
+        """Check that every reference names something that is declared; else note a mistake, with the nearest right
+        word."""
         for path, kind, name in self.references:
             if not self.knows(kind, name) and len(self.mistakes) < MOST_MISTAKES:
                 names = self.names(kind)
@@ -173,7 +175,7 @@ class Reading:
 
 
 def found(node: Node) -> str:
-    """What stands at a node, in words."""
+    """What stands at a node of the file, in words, for messages."""
     if node.kind == SEQUENCE:
         return f"a list of {len(node.items)}" if node.items else "an empty list"
     if node.kind == MAPPING:

@@ -22,7 +22,7 @@ class Vector(Value):
     elsewhere: tuple[tuple[int, str], ...] = ()
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """tuple or BAD."""
+        """The components at a node of the file, or BAD with a mistake noted."""
         if node.kind != SEQUENCE or len(node.items) != self.length:
             where = dict(self.elsewhere).get(len(node.items)) if node.kind == SEQUENCE else None
             hint = f"; {where}" if where else ""
@@ -32,7 +32,7 @@ class Vector(Value):
         return BAD if any(value is BAD for value in values) else values
 
     def schema(self) -> Schema:
-        """array of fixed length."""
+        """The JSON Schema: a list of a fixed number of components."""
         return {
             "type": "array", "items": self.item.schema(), "minItems": self.length, "maxItems": self.length,
         }  # fmt: skip
@@ -45,7 +45,7 @@ class Direction(Value):
     pair: Vector
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """tuple or BAD."""
+        """The components of a vector that is not zero, or BAD with a mistake noted."""
         vector = self.pair.read(node, path, reading)
         if vector is not BAD and not any(vector):
             reading.mistake(path, "found a zero vector, allowed is a direction")
@@ -53,20 +53,20 @@ class Direction(Value):
         return vector
 
     def schema(self) -> Schema:
-        """As of the vector."""
+        """The JSON Schema of a vector."""
         return self.pair.schema()
 
 
 @frozen
 class ListOf(Value):
-    """A list of values of one kind."""
+    """The kind of a list whose values are all of one kind."""
 
     item: Kind
     at_least: int = 0
     what: str = "entries"
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """list (entries may be BAD) or BAD."""
+        """The list at a node of the file, BAD in the place of what cannot be read; BAD where it is no list."""
         if node.kind != SEQUENCE:
             reading.mistake(path, f"found {found(node)}, allowed is a list of {self.what}", node)
             return BAD
@@ -82,7 +82,7 @@ class ListOf(Value):
         return values
 
     def schema(self) -> Schema:
-        """array."""
+        """The JSON Schema of a list of such values."""
         schema: Schema = {"type": "array", "items": self.item.schema()}
         return {**schema, "minItems": self.at_least} if self.at_least else schema
 
@@ -96,7 +96,7 @@ class Named(Value):
     at_least: int = 0
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """dict of good names (values may be BAD) or BAD."""
+        """The values at a node by their names, BAD in the place of what cannot be read; BAD where it is no mapping."""
         if node.kind != MAPPING:
             reading.mistake(path, f"found {found(node)}, allowed is a mapping from names to values", node)
             return BAD
@@ -116,7 +116,7 @@ class Named(Value):
         return values
 
     def schema(self) -> Schema:
-        """object whose keys are names."""
+        """The JSON Schema: a mapping from names to such values."""
         schema: Schema = {
             "type": "object", "propertyNames": Name().schema(), "additionalProperties": self.item.schema(),
         }  # fmt: skip
@@ -132,7 +132,7 @@ class ByName(Value):
     what: str
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """dict (values may be BAD) or BAD."""
+        """The values at a node by their names, BAD in the place of what cannot be read; BAD where it is no mapping."""
         if node.kind != MAPPING:
             allowed = f"{{{self.kind}: {self.what}, ...}}"
             reading.mistake(path, f"found {found(node)}, allowed is {allowed}", node)
@@ -149,13 +149,14 @@ class ByName(Value):
         return values
 
     def schema(self) -> Schema:
-        """object of values."""
+        """The JSON Schema: a mapping from names to such values."""
         return {"type": "object", "additionalProperties": self.item.schema()}
 
 
 @frozen
 class ByShape(Value):
-    """Different kinds for a scalar, a sequence, a mapping. what: all of them in words."""
+    """The kind of a value that is read as one kind where it is a scalar, and as others where it is a list or a
+    mapping."""
 
     what: str
     scalar: Kind | None = None
@@ -163,7 +164,7 @@ class ByShape(Value):
     mapping: Kind | None = None
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """What the kind for the node's shape reads, or BAD."""
+        """The value at a node, as read by the kind for its shape (scalar, list or mapping), or BAD."""
         kind = {SCALAR: self.scalar, SEQUENCE: self.sequence, MAPPING: self.mapping}[node.kind]
         if kind is None:
             reading.mistake(path, f"found {found(node)}, allowed is {self.what}", node)
@@ -171,21 +172,21 @@ class ByShape(Value):
         return kind.read(node, path, reading)
 
     def schema(self) -> Schema:
-        """Any of them."""
+        """The JSON Schema of all forms that the value may have."""
         kinds = [kind for kind in (self.scalar, self.sequence, self.mapping) if kind is not None]
         return {"anyOf": [kind.schema() for kind in kinds]}
 
 
 @frozen
 class ByDepth(Value):
-    """Different kinds for a list of single values and for a list of lists. what: both in words."""
+    """The kind of a list, which is read as one kind if it holds single values, and as another if it holds lists."""
 
     what: str
     flat: Kind
     nested: Kind
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """What the kind for the list reads, or BAD."""
+        """The value at a node, read as a list or as a list of lists by its depth, or BAD."""
         if node.kind != SEQUENCE or not node.items:
             reading.mistake(path, f"found {found(node)}, allowed is {self.what}", node)
             return BAD
@@ -193,13 +194,14 @@ class ByDepth(Value):
         return kind.read(node, path, reading)
 
     def schema(self) -> Schema:
-        """Either."""
+        """The JSON Schema of both forms that the value may have."""
         return {"anyOf": [self.flat.schema(), self.nested.schema()]}
 
 
 @frozen
 class Tagged(Value):
-    """A mapping whose key `tag` says which keys it has besides. elsewhere: a word -> where it would be right."""
+    """The kind of a mapping whose key `tag` says which keys it has besides. elsewhere: a word -> where it would be
+    right."""
 
     what: str
     tag: str
@@ -209,11 +211,11 @@ class Tagged(Value):
 
     @property
     def known(self) -> dict[str, Record]:
-        """The variants, with those of other distributions that have been asked for."""
+        """The variants by their tags, with those of other distributions that have been asked for."""
         return {**self.variants, **(self.more.found if self.more is not None else {})}
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """Fields (values may be BAD) or BAD."""
+        """The values at a node by the keys that its tag allows, BAD in the place of what cannot be read."""
         if node.kind != MAPPING:
             words = " | ".join(self.known)
             message = f"found {found(node)}, allowed is {self.what}: a mapping with `{self.tag}: {words}`"
@@ -246,7 +248,7 @@ class Tagged(Value):
         return Word(tuple(self.known), meanings=tuple(record.doc for record in self.known.values()))
 
     def schema(self) -> Schema:
-        """object whose further keys depend on the tag."""
+        """The JSON Schema: a mapping whose further keys depend on the tag."""
         return {
             "type": "object",
             "required": [self.tag],
@@ -279,7 +281,7 @@ class Key(Value):
 
     @property
     def text(self) -> str:
-        """Meaning, unit, and what is taken where the key is left out."""
+        """The description of a key: meaning, unit, and what is taken where it is left out."""
         unit = f"in {self.unit}" if self.unit else ""
         otherwise = f"default {self.otherwise}" if self.otherwise else ""
         parts = [self.doc, unit, otherwise]
@@ -332,13 +334,13 @@ class Record(Value):
 
     @property
     def sets(self) -> tuple[tuple[str, ...], ...]:
-        """`one_of`, with what other distributions have brought."""
+        """Which keys exclude each other (`one_of`), with those that other distributions have brought."""
         if self.more is None or not self.more.found:
             return self.one_of
         return ((*self.one_of[0], *self.more.found), *self.one_of[1:])
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """Fields (values may be BAD) or BAD."""
+        """The values at a node by their keys, BAD in the place of what cannot be read; BAD where it is no mapping."""
         if node.kind != MAPPING:
             words = listed(key.name for key in self.all_keys)
             message = f"found {found(node)}, allowed is {self.what}, a mapping with the keys {words}"
@@ -416,7 +418,7 @@ class Record(Value):
                 reading.mistake(inside(path, name), message)
 
     def schema(self) -> Schema:
-        """object without further keys."""
+        """The JSON Schema: a mapping with these keys and no others."""
         schema: Schema = {
             "type": "object",
             "properties": {key.name: key.schema() for key in self.all_keys},

@@ -29,7 +29,7 @@ Made = Callable[[str, Fields, Frames, Reading], Response | None]
 
 @frozen(kw_only=True)
 class ResponseKind(Value):
-    """A response.
+    """What is declared of a response: its name, keys and unit, and where its code is.
 
     word: as case files have it; doc: what of what, for the case reference; unit: of its values.
     keys: those that stand beside it, None where the word stands alone; made: the response from its keys, None where
@@ -39,6 +39,9 @@ class ResponseKind(Value):
     of_point: whether it is the motion of a point, seen from a body, as a component or a norm.
     depends_on_rate: whether it needs velocities or accelerations; is_energy: whether it is the stored energy.
     of_members: whether it is the largest one of the members of a group. jumps: whether it jumps at half a turn.
+    in_space: the word for the same in space, where a planar case is lifted there; empty where nobody has said which.
+    is_component: whether that is a vector in space, of which the planar one is the component along the normal.
+    of_axis: whether its numbers are a direction in body coordinates.
     """
 
     word: str
@@ -54,6 +57,9 @@ class ResponseKind(Value):
     is_energy: bool = False
     of_members: bool = False
     jumps: bool = False
+    in_space: str = ""
+    is_component: bool = False
+    of_axis: bool = False
 
 
 RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
@@ -100,7 +106,7 @@ _OF_JOINT = Record(
 
 
 def with_since(record: Record) -> Record:
-    """The keys of a point's motion, and what a displacement counts from."""
+    """The keys of a point's motion, and the key that says from which place a displacement counts."""
     return replace(record, keys=(*record.keys, SINCE))
 
 
@@ -142,7 +148,7 @@ def _point(word: str, unit: str, order: int) -> ResponseKind:
     return ResponseKind(
         word=word, doc="of a point", unit=unit, kernels="mdstopo.general.general_responses:OF_POINT", keys=keys,
         made=_at_point,
-        order=order, is_position=order == 0, of_point=True, depends_on_rate=order > 0,
+        order=order, is_position=order == 0, of_point=True, depends_on_rate=order > 0, in_space=word,
     )  # fmt: skip
 
 
@@ -150,17 +156,19 @@ def _angle(word: str, unit: str, order: int) -> ResponseKind:
     return ResponseKind(
         word=word, doc="of a body", unit=unit, kernels="mdstopo.general.general_responses:OF_ANGLE", keys=_OF_ANGLE,
         made=_of_angle, order=order, is_position=order == 0, depends_on_rate=order > 0,
+        in_space="rotation" if order == 0 else word, is_component=True,
     )  # fmt: skip
 
 
 def key_of(kind: ResponseKind) -> Key:
-    """A response with keys of its own, as the case file has it."""
+    """The key of the case file for a response that has keys of its own."""
     assert kind.keys is not None
     return Key(kind.word, kind.keys, f"{kind.doc}, in {kind.unit}" if kind.unit else kind.doc)
 
 
 def enter_response(kind: Any) -> Key:
-    """Take in a response of another distribution; TypeError where it is none, or its word is taken."""
+    """Add the response of another distribution to the known ones; TypeError where it is no response, or its word is
+    taken."""
     if not isinstance(kind, ResponseKind) or kind.keys is None or kind.made is None:
         raise TypeError(f"found {kind!r}, needed is a ResponseKind with `keys` and `made`")
     if RESPONSES.setdefault(kind.word, kind) is not kind:
@@ -175,7 +183,7 @@ OF_OTHERS = Brought("mdstopo.responses", enter_response)
 def response_kinds(
     kinds: Mapping[str, ResponseKind], elsewhere: tuple[tuple[str, str], ...], more: Brought[Key] | None = None
 ) -> ByShape:
-    """A response of some kinds, as the case file has it.
+    """The kind of a value that states a response: a word, or a mapping from a word to the response's keys.
 
     elsewhere: words of responses that are not of this dimension, and what stands in their place. more: those of other
     distributions.
@@ -195,7 +203,7 @@ def response_kinds(
 
 
 def of_expressions(response: ByShape) -> ResponseKind:
-    """The response that is an expression of others, which case files have so."""
+    """The record of the response that is an expression of others."""
     return ResponseKind(
         word="expression", doc="an expression of other responses", unit="", kernels="", keys=expression_keys(response),
         made=make_expression,
@@ -215,6 +223,7 @@ RESPONSES: dict[str, ResponseKind] = {
             kernels="mdstopo.general.general_responses:OF_ENERGY",
             depends_on_rate=False,
             is_energy=True,
+            in_space="energy",
         ),
         _point("displacement", "m", 0),
         _point("velocity", "m/s", 1),
@@ -230,6 +239,7 @@ RESPONSES: dict[str, ResponseKind] = {
             keys=_OF_GROUP,
             made=_of_group,
             of_members=True,
+            in_space="member_force",
         ),
         ResponseKind(
             word="joint_force",
@@ -238,6 +248,7 @@ RESPONSES: dict[str, ResponseKind] = {
             kernels="mdstopo.general.general_responses:OF_JOINT_FORCE",
             keys=_OF_JOINT,
             made=_of_joint,
+            in_space="joint_force",
         ),
         ResponseKind(
             word="joint_moment",
@@ -246,6 +257,7 @@ RESPONSES: dict[str, ResponseKind] = {
             kernels="mdstopo.general.general_responses:OF_JOINT_MOMENT",
             keys=_OF_JOINT,
             made=_of_joint,
+            in_space="joint_moment",
         ),
     )
 }

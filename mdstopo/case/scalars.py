@@ -23,7 +23,7 @@ _LONGEST_INTEGER = 400
 
 
 def resolve(text: str) -> Scalar:
-    """The value of a plain scalar: None, bool, int, float (infinite where out of range, NaN) or text."""
+    """The value of an unquoted scalar of YAML: None, bool, int, float (infinite where out of range, NaN) or text."""
     if text in _WORDS:
         return _WORDS[text]
     first = text[0]

@@ -101,17 +101,17 @@ _CATALOGUE = Record(
 
 @frozen
 class ParameterWord(OpenWord):
-    """A number of a law; those of formulas are called as the case calls them."""
+    """The kind of a name of a law's parameter; those of formulas have the names that the case gives them."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str or BAD."""
+        """The name of the parameter at a node of the file, or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if isinstance(value, str) and value in reading.declared.get("law parameter", ()):
             return value
         return OpenWord(self.words, self.instead, self.meanings, self.anew).read(node, path, reading)
 
     def schema(self) -> Schema:
-        """Known words, and any other."""
+        """The JSON Schema: the words that are known, or any other."""
         known = OpenWord(self.words, self.instead, self.meanings, self.anew).schema()
         return {"anyOf": [known, {"type": "string", "description": "a parameter of a law of formulas"}]}
 

@@ -17,12 +17,13 @@ from mdstopo.case.value import Value, frozen
 
 @frozen
 class ColumnOf(Value):
-    """A column of a file: its name in the header line, or its place from 0. number: instead of a place, a number."""
+    """The kind of a column of a file: its name in the header line, or its place from 0. number: allows a number
+    instead."""
 
     number: Number | None = None
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """str, int (float in the place of it), or BAD."""
+        """The name or the place of a column (where allowed, a number instead), or BAD with a mistake noted."""
         value = node.scalar() if node.kind == SCALAR else None
         if self.number is not None and isinstance(value, (int, float)) and not isinstance(value, bool):
             return self.number.read(node, path, reading)
@@ -35,7 +36,7 @@ class ColumnOf(Value):
         return BAD
 
     def schema(self) -> Schema:
-        """string or number."""
+        """The JSON Schema of a column: its name, or a number."""
         place: Schema = {"type": "integer", "minimum": 0}
         return {"anyOf": [{"type": "string", "minLength": 1}, place if self.number is None else self.number.schema()]}
 
@@ -64,7 +65,7 @@ def _shift(name: str, what: str, unit: str) -> Key:
 
 
 def fit_record(response: Kind, load_case: Key) -> Record:
-    """The section, in a plane or in space.
+    """The keys of the section `fit`, in a plane or in space.
 
     response: the kinds of responses. load_case: the key that says where.
     """

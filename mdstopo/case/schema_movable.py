@@ -26,7 +26,7 @@ _RECTANGLE = Record(
 
 
 def along_line(first: Key, last: Key) -> Key:
-    """The region that is a straight line between two points."""
+    """The keys of a region that is a straight line between two points."""
     doc = "A straight line between two points; a point on it has one variable, its distance from the first."
     return Key("line", Record("a line", (first, last), doc=doc), "the points move along a straight line")
 

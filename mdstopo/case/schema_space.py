@@ -38,13 +38,13 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 def with_keys(record: Record, *new: Key) -> Record:
-    """A record with other keys in the place of those of their names."""
+    """A record with some of its keys replaced by others of the same names."""
     known = {key.name: key for key in record.keys}
     return replace(record, keys=tuple((known | {key.name: key for key in new}).values()))
 
 
 def with_kind(record: Record, name: str, kind: Kind) -> Key:
-    """A key of a record with another kind."""
+    """One key of a record, with another kind of value."""
     (key,) = (key for key in record.keys if key.name == name)
     return replace(key, kind=kind)
 

@@ -17,10 +17,10 @@ from mdstopo.case.words import inside, listed
 
 @frozen
 class Anything(Value):
-    """Any value: what it may be is decided where it is put."""
+    """The kind of any value: what it may be is decided where it is put."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """Python's numbers, texts, truth values, None, lists and dicts of them."""
+        """The value at a node in Python: numbers, texts, truth values, None, lists and dicts of them."""
         if node.kind == MAPPING:
             return {name: self.read(value, inside(path, name), reading) for name, (_, value) in node.entries.items()}
         if node.kind == SEQUENCE:
@@ -28,19 +28,19 @@ class Anything(Value):
         return node.scalar()
 
     def schema(self) -> Schema:
-        """No limits."""
+        """The JSON Schema: without limits."""
         return {}
 
 
 @frozen
 class ByKey(Value):
-    """A mapping from keys that are no names: paths of keys of the case, or places in a list. what: both in words."""
+    """The kind of a mapping from key paths, or from places in a list, to values of one kind. what: both in words."""
 
     what: str
     item: Kind
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """dict (values may be BAD) or BAD."""
+        """The values at a node by their keys, BAD in the place of what cannot be read; BAD where it is no mapping."""
         if node.kind != MAPPING:
             reading.mistake(path, f"found {found(node)}, allowed is a mapping from {self.what}", node)
             return BAD
@@ -52,7 +52,7 @@ class ByKey(Value):
         return values
 
     def schema(self) -> Schema:
-        """object of values."""
+        """The JSON Schema: a mapping to such values."""
         return {"type": "object", "additionalProperties": self.item.schema()}
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 
 class SensitivityKind(NamedTuple):
-    """A method of differentiation.
+    """What is declared of a method of differentiation: its name, where its code is, and what it can do.
 
     name: as case files have it; doc: a sentence for the case reference. springs, general: module:function for springs
     between free bodies and for everything else, called as `by_direct` of the two modules is; empty of a method whose
@@ -34,7 +34,7 @@ class SensitivityKind(NamedTuple):
 
     @property
     def comes_with_values(self) -> bool:
-        """Whether gradients come with the values."""
+        """Whether gradients are computed together with the values."""
         return not self.springs
 
 
@@ -90,5 +90,5 @@ def chosen(word: str) -> SensitivityKind:
 
 
 def having(capability: str) -> list[str]:
-    """The methods that have a capability, in words."""
+    """The names of the methods that have a capability."""
     return [kind.name for kind in SENSITIVITIES.values() if getattr(kind, capability)]

@@ -95,7 +95,7 @@ def _warn_ignored(fields: Fields, reading: Reading) -> None:
 
 
 def warn_assemble(top: Fields, reading: Reading) -> None:
-    """`assemble` without anything to assemble."""
+    """Warn where `assemble` is set and the case has nothing to assemble."""
     solver = top["solver"]
     if not isinstance(solver, Fields) or solver["assemble"] is not True:
         return

@@ -5,14 +5,14 @@ from pathlib import Path
 
 
 def folder() -> Path:
-    """Where they are."""
+    """The folder of the cases that come with the package."""
     package = Path(__file__).parent.parent
     inside = package / "cases"
     return inside if inside.is_dir() else package.parent / "cases"
 
 
 def names() -> list[str]:
-    """The names of all of them."""
+    """The names of all cases that come with the package."""
     return sorted(path.stem for path in folder().glob("*.yaml"))
 
 

@@ -13,13 +13,13 @@ from mdstopo.case.words import inside, number_text
 
 
 def stage_count(case: Case) -> int:
-    """How many optima a run of the case goes through; 1 for most."""
+    """The number of stages of a case, in each of which a run finds an optimum; 1 for most."""
     return max([1, *(len(group.powers) for group in case.design_groups)])
 
 
 def stage_case(case: Case, stage: int) -> Case:
-    """The case with the powers of one stage, from 0, as if it had no others; lists that have ended stay at their
-    last."""
+    """The case with the powers of one stage, from 0, and no other stages; lists that have ended stay at their last
+    power."""
     return replace(
         case,
         members=tuple(

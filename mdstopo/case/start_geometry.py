@@ -20,7 +20,7 @@ LARGEST = 1e150
 
 @frozen
 class Frames(Value):
-    """Where the bodies stand at the start. bodies: those that could be read, ground included."""
+    """Positions and rotations of the bodies at the start. bodies: those that could be read, ground included."""
 
     bodies: dict[str, AnyBody]
     geometry: Geometry
@@ -34,14 +34,14 @@ class Frames(Value):
         return local if body == GROUND else self.geometry.to_world(self.bodies[body], local)
 
     def both(self, body: str, points: FloatArray, frame: str) -> tuple[FloatArray, FloatArray]:
-        """(local, world) of points given in `frame`: global or body."""
+        """Points in the coordinates of their body and in global ones, from points stated in `frame`: global or body."""
         with np.errstate(over="ignore", invalid="ignore"):
             if frame == "body":
                 return points, self.to_world(body, points)
             return self.to_local(body, points), points
 
     def point(self, body: str, point: Components, frame: str = "global") -> tuple[Components, Components]:
-        """(local, world) of one point."""
+        """A point at the start, in the coordinates of its body and in global ones."""
         local, world = self.both(body, np.array([point], dtype=np.float64), frame)
         return tuple(local[0].tolist()), tuple(world[0].tolist())
 
@@ -68,7 +68,7 @@ def in_range(values: FloatArray, path: str, reading: Reading) -> bool:
 
 
 def build_points(sections: Any, frames: Frames, reading: Reading) -> dict[str, PointGrid]:
-    """The grids that can be made, by name."""
+    """The grids of points by name, without those that cannot be made; mistakes are noted."""
     grids: dict[str, PointGrid] = {}
     for name, fields in (sections or {}).items():
         grid = None if fields is BAD else _build_grid(name, fields, frames, reading)

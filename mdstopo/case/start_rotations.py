@@ -73,7 +73,7 @@ def frame_along(axis: FloatArray) -> FloatArray:
 
 
 def frame_with(axis: FloatArray, towards: FloatArray) -> FloatArray:
-    """The same, with the second one in the plane of the axis and another vector that is not along it."""
+    """As `frame_along`, with the second vector in the plane of the axis and another vector that is not along it."""
     second = towards - float(towards @ axis) * axis
     second = unit(second.tolist())
     second = unit((second - float(second @ axis) * axis).tolist())  # once more: what cancelled is gone

@@ -18,7 +18,7 @@ from mdstopo.case.words import inside
 
 
 def surface_contact(common: dict[str, Any], on: Fields, frames: Frames, reading: Reading) -> SurfaceContact | None:
-    """The contact of points with a surface, None where there is no such surface, which is noted."""
+    """The contact of points with a surface of a body; None where there is no such surface, which is noted."""
     stated = [shape for shape in SHAPES if shape in on.stated and on[shape] is not BAD]
     if len(stated) != 1 or not on.good() or not on[stated[0]].good():
         return None

@@ -39,7 +39,7 @@ class PathError(ValueError):
 
 @frozen
 class SvgPath(Value):
-    """The text of a path's attribute `d`."""
+    """The kind of a text that is the attribute `d` of an SVG path."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """Closed lines, a tuple of arrays (n, 2) with n >= 3, or BAD."""
@@ -54,7 +54,7 @@ class SvgPath(Value):
             return BAD
 
     def schema(self) -> Schema:
-        """string."""
+        """The JSON Schema of a text."""
         return {"type": "string", "minLength": 1}
 
 

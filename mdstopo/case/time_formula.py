@@ -22,7 +22,7 @@ MOST_PARAMETERS = 8
 
 
 def formula_record(names: tuple[str, ...]) -> Record:
-    """The keys of formulas of time for some quantities."""
+    """The keys of a mapping that states formulas of time for some quantities."""
     text = FormulaText()
     several = ListOf(text, len(names), "formulas")
     kind = text if len(names) == 1 else ByShape(f"a list of {len(names)} expressions", sequence=several)
@@ -41,7 +41,7 @@ def formula_record(names: tuple[str, ...]) -> Record:
 
 
 def read_formulas(node: Node, names: tuple[str, ...], path: str, reading: Reading, instead: str) -> Any:
-    """tuple[TimeFormula, ...] of a mapping with formulas, or of a text; BAD where something is a mistake.
+    """The formulas of time that a mapping, or a text, states, one a quantity; BAD where something is a mistake.
 
     instead: what else a text may have been meant to be, in words.
     """
@@ -78,7 +78,7 @@ def _made(texts: list[tuple[str, str]], parameters: dict[str, float], reading: R
 
 
 def why_unusable(formula: TimeFormula) -> str:
-    """Why a formula of time cannot be computed; nothing where it can."""
+    """Why a formula of time cannot be computed; empty where it can."""
     from mdstopo.formula.law_formulas import why_too_large  # most cases have no formulas
 
     names = [name for name, _ in formula.parameters]
@@ -92,7 +92,7 @@ def why_unusable(formula: TimeFormula) -> str:
 
 
 def is_formula(node: Node) -> bool:
-    """Whether a mapping states formulas."""
+    """Whether a mapping in the file states formulas of time."""
     return node.kind == MAPPING and "formula" in node.entries
 
 

@@ -13,7 +13,8 @@ from mdstopo.case.value import Value, frozen
 
 @frozen
 class UncertainNumber(Value):
-    """A number of the case, by its key path as messages write it; nominal: what the case states."""
+    """A number of the case that varies: its key path as messages write it, and the value that the case states
+    (nominal)."""
 
     key: str
     nominal: float
@@ -22,7 +23,8 @@ class UncertainNumber(Value):
 
 @frozen
 class Scenario(Value):
-    """Keys of the case and what they are set to in this scenario, as YAML; with its probability, all of sum 1."""
+    """Values that keys of the case have together (as YAML), with a probability; those of all scenarios have the
+    sum 1."""
 
     name: str
     probability: float
@@ -31,7 +33,8 @@ class Scenario(Value):
 
 @frozen
 class Measure(Value):
-    """What values become: name of a record of `case.measures`, with `factor` and `level` where these are part of it."""
+    """What the values at all points of a sample become: a record of `case.measures`, with `factor` and `level` where
+    these are part of it."""
 
     name: str
     factor: float = 0.0
@@ -39,17 +42,17 @@ class Measure(Value):
 
     @property
     def words(self) -> str:
-        """In words."""
+        """The measure in words, for tables."""
         return self.kind.in_words.format(factor=self.factor, level=self.level)
 
     @property
     def kind(self) -> MeasureKind:
-        """Its record."""
+        """The record of the measure (`case.measures`)."""
         return MEASURES[self.name]
 
     @property
     def is_sampled(self) -> bool:
-        """Whether it is of the points of a sample; else of the case as it is written."""
+        """Whether it is computed from the points of a sample; else it is the value of the case as it is written."""
         return bool(self.kind.made_by)
 
 

@@ -27,7 +27,7 @@ _CERTAIN = frozenset({"format", "title", "design", "combine", "optimizer", "solv
 def build_uncertainty(
     top: Fields, constraints: Sequence[VolumeRow | ResponseRow], root: Node, reading: Reading
 ) -> Uncertainty | None:
-    """The section; None where it could not be read. root: the whole case."""
+    """The section `uncertainty`; None where it could not be read. root: the whole case."""
     fields = top["uncertainty"]
     if not isinstance(fields, Fields):
         return None

@@ -16,7 +16,7 @@ ROUNDING = 1e-12
 def check_feasible(
     rows: list[tuple[str, VolumeRow]], design: list[MemberGroup], variables: tuple[Variable, ...], reading: Reading
 ) -> None:
-    """Notes rows (with the path of their bound) that bounds, alone or with one other row, make infeasible.
+    """Note volume rows that no design within the bounds keeps, alone or together with one other row.
 
     The sum over a group can be anything between those at its bounds, whatever other groups do: so a row, and
     a pair of rows, can be judged from the groups' sums alone. What variables cost counts as a group of its own.

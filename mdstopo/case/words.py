@@ -40,12 +40,12 @@ def count_text(count: int) -> str:
 
 
 def number_text(value: float) -> str:
-    """A number as short as it can be said."""
+    """A number in as few digits as tell it exactly."""
     return f"{value:.10g}"
 
 
 def nearest(word: str, words: Iterable[str]) -> str | None:
-    """The one of `words` most like `word`, capitals aside; None where none is like it."""
+    """The one of `words` most like a word, whatever the case of its letters; None where none is like it."""
     from difflib import get_close_matches
 
     by_lower = {candidate.lower(): candidate for candidate in islice(words, _MOST_COMPARED)}
@@ -54,6 +54,6 @@ def nearest(word: str, words: Iterable[str]) -> str | None:
 
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:
-    """``, did you mean 'x'?`` or nothing."""
+    """A hint for a mistyped word: ``, did you mean 'x'?``; empty where no word is like it."""
     best = nearest(word, words)
     return f", did you mean {best!r}?" if best is not None else ""

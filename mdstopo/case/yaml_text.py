@@ -19,7 +19,7 @@ _OPEN = 1
 
 
 def text_of(content: Mapping[str, Any]) -> str:
-    """A document of mappings, lists, text, numbers, truth values and None."""
+    """The YAML text of a document of mappings, lists, text, numbers, truth values and None."""
     return "\n".join(_block(content, "", 0)) + "\n"
 
 

@@ -74,7 +74,7 @@ def reached(each: "Compared") -> str:
 
 
 def document(each: "Compared") -> dict[str, Any]:
-    """What was found as values for JSON."""
+    """The bound of one objective as values for JSON."""
     return {"bound": each.bound, "why": each.why, "best": each.best, "gap": each.gap}
 
 

@@ -111,10 +111,10 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
     document: dict[str, Any] = {"uncertainty": say_sample(output, case)}
     announce_compilation(output, case)
     from mdstopo.evaluators import evaluator_of
-    from mdstopo.session.compiling_apart import STEPS, compiled_beside
+    from mdstopo.session.compiling_apart import STEPS, compiling_in_background
 
-    with compiled_beside(case, STEPS):
-        engine = evaluator_of(case, beside=False)
+    with compiling_in_background(case, STEPS):
+        engine = evaluator_of(case, in_background=False)
         found = frequencies(case, engine)
         integrator = engine.integrator
     freedoms = {name: engine.degrees_of_freedom(name) for name in engine.scenes}

@@ -48,7 +48,7 @@ def cost(case: "Case", engine: "Evaluator") -> dict[str, Any] | None:
 
 
 def in_words(found: dict[str, Any] | None) -> str:
-    """A sentence of what `cost` has found."""
+    """The result of `cost` as a sentence."""
     if found is None:
         return "not known: kernels that it needs have not been compiled here yet"
     if "message" in found:

@@ -23,7 +23,7 @@ class Vibrates(Protocol):
 
 
 def totals(case: Case) -> list[tuple[str, float, str]]:
-    """Name, value, unit of what sums up the case."""
+    """Name, value and unit of each number that sums up the case."""
     masses = np.array([body.mass for body in case.bodies])
     positions = np.array([body.position for body in case.bodies]).reshape(-1, case.dimension)
     rows = [("mass", float(masses.sum()), "kg")]
@@ -141,7 +141,8 @@ def _at(signal: Signal, time: float) -> float:
 
 
 def depths(case: Case) -> list[Floats]:
-    """(n,) of each contact: how deep its points are in it at the start, m; below 0 in front of it, -inf beside it."""
+    """(n,) the largest depth of each contact's points at the start (m); below 0 where they are in front of it, -inf
+    where beside it."""
     return [_surface_depths(case, each) if case.dimension > 2 else _edge_depths(case, each) for each in case.contacts]
 
 

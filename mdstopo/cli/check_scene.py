@@ -20,7 +20,7 @@ FEWEST = 10.0
 
 
 class Modes(Protocol):
-    """`scene.vibration_modes.Modes`."""
+    """What is used of `scene.vibration_modes.Modes`, for types."""
 
     @property
     def squares(self) -> Floats: ...
@@ -98,7 +98,7 @@ def unrestrained(case: Case, load_case: LoadCase) -> list[tuple[str, ...]]:
 
 
 def restraint(case: Case, load_case: LoadCase, modes: Modes, bodies: tuple[str, ...]) -> dict[str, Any]:
-    """Of small motion about the start: what moves without stiffness, and what grows.
+    """Bodies that move without stiffness in small motion about the start, and motions that grow.
 
     bodies: whose freedoms the modes' shapes have, in their order. `free`: sets of bodies that nothing holds, which move
     as a whole; `loose`: how many other modes have no stiffness; `movers`: what moves in them, where they are all that
@@ -120,7 +120,7 @@ def restraint(case: Case, load_case: LoadCase, modes: Modes, bodies: tuple[str, 
 
 
 def in_words(found: dict[str, Any]) -> list[str]:
-    """What `restraint` found, a sentence each."""
+    """The result of `restraint`, one sentence each."""
     told = [
         f"nothing holds {' and '.join(names)}: no member, joint, bushing or contact leads to ground or to a driven body"
         for names in found["free"]

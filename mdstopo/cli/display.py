@@ -18,7 +18,7 @@ _REFRESH = 0.1  # seconds between changes of the picture
 
 
 class Silent(Generic[T]):
-    """Says nothing. A context manager that is told of every step of the work."""
+    """A display that says nothing."""
 
     def __enter__(self) -> "Silent[T]":
         return self
@@ -33,7 +33,7 @@ class Silent(Generic[T]):
 
 
 class Plain(Silent[T]):
-    """A line every few seconds: for logs. What is over before says nothing."""
+    """A display for logs: a line every few seconds. Work that is over before then is not mentioned."""
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
         self._clock = clock
@@ -51,7 +51,7 @@ class Plain(Silent[T]):
 
 
 class Live(Silent[T]):
-    """A picture that changes in place, drawn with rich, which is imported only here."""
+    """A display that changes in place, drawn with rich, which is imported only here."""
 
     def __init__(self) -> None:
         self._drawn_at = 0.0

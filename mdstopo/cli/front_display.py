@@ -17,14 +17,14 @@ _SOON = 1.0  # seconds below which no guess of the time left is told
 
 
 class Plain(displays.Plain["Snapshot"]):
-    """A line every few seconds."""
+    """The progress of a front as a line every few seconds, for logs."""
 
     def _words(self, snapshot: "Snapshot") -> str:
         return line(snapshot)
 
 
 class Live(displays.Live["Snapshot"]):
-    """A table that changes in place."""
+    """The progress of a front as a table that changes in place."""
 
     def _picture(self, snapshot: "Snapshot") -> "Table":
         return picture(snapshot)
@@ -38,7 +38,7 @@ def front_display(quiet: bool) -> "displays.Silent[Snapshot]":
 
 
 def line(snapshot: "Snapshot") -> str:
-    """How far a front is, in one line."""
+    """How far a front has come, in one line."""
     total = len(snapshot.directions)
     return (
         f"{len(snapshot.best)} of {total} points have a design, {len(snapshot.running)} are worked on; "
@@ -54,7 +54,8 @@ def _left(seconds: float) -> str:
 
 
 def picture(snapshot: "Snapshot") -> "Table":
-    """Points in rows: what is running first where not all have room."""
+    """The table of a front that is displayed: a row for each point, those being worked on first where not all have
+    room."""
     from rich.table import Table
 
     table = Table(title=line(snapshot), title_justify="left", box=None, padding=(0, 2))

@@ -114,11 +114,11 @@ def command(
     with output_file(path, case, "gradient", overwrite=overwrite, notify=output.notice, command=line) as file:
         announce_compilation(output, case)
         from mdstopo.evaluators import evaluator_of
-        from mdstopo.session.compiling_apart import RESPONSES, compiled_beside
+        from mdstopo.session.compiling_apart import RESPONSES, compiling_in_background
         from mdstopo.status import RunStatus
         from mdstopo.store.contents import design_part, sensitivity_part
 
-        with compiled_beside(case, RESPONSES):
+        with compiling_in_background(case, RESPONSES):
             engine = evaluator_of(case)
             check_design(engine, alpha, alpha_path)
             datasets: dict[str, Any] = design_part(case, engine.design(alpha))

@@ -52,21 +52,21 @@ class Part:
         return Part(mass, centre, inertia)
 
     def about(self, point: Floats) -> Floats:
-        """The inertia (3, 3) about a point."""
+        """The inertia (3, 3) of the part about a point."""
         arm = self.centre - point
         return self.inertia + self.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
 
 
 @dataclass
 class Tree:
-    """Bodies and joints as they are found; told: what of the file is left out."""
+    """Bodies and joints that were found in a file; told: remarks on what of the file is left out."""
 
     bodies: dict[str, Part] = field(default_factory=dict)
     joints: list[Plain] = field(default_factory=list)
     told: list[str] = field(default_factory=list)
 
     def tell(self, sentence: str) -> None:
-        """Note a remark, once."""
+        """Note a remark for the user, once."""
         if sentence not in self.told:
             self.told.append(sentence)
 
@@ -113,7 +113,7 @@ def _plain(values: Floats) -> list[Any]:
 
 
 def as_name(text: str) -> str:
-    """A name as a case may have it."""
+    """A text changed to a name that a case may have."""
     word = re.sub(r"[^A-Za-z0-9_-]", "_", text)
     return word if re.match(r"[A-Za-z_]", word) and word not in ("ground", "all", "default") else f"_{word}"
 

@@ -12,7 +12,7 @@ from mdstopo.cli.output import Output
 
 
 class Interrupts:
-    """Handles these signals of this process.
+    """Handles SIGINT, SIGTERM and SIGHUP of this process: the first one asks for a stop.
 
     Before `stop_requested` is first asked, and at the second request, a signal raises KeyboardInterrupt; in
     between it is only noted, so that the iteration can be finished and saved.

@@ -27,17 +27,17 @@ DESIGN_FILE = FileOf((".npy", ".txt", ".h5"))
 
 
 def case_argument(function: F) -> F:
-    """CASE, a YAML file."""
+    """Add the argument CASE, a YAML file, to a command."""
     return click.argument("case_path", metavar="CASE", type=CASE_FILE)(function)
 
 
 def result_argument(function: F) -> F:
-    """RESULT, an HDF5 file."""
+    """Add the argument RESULT, an HDF5 file, to a command."""
     return click.argument("result_path", metavar="RESULT", type=RESULT_FILE)(function)
 
 
 def set_option(function: F) -> F:
-    """--set KEY=VALUE."""
+    """Add the option `--set KEY=VALUE` to a command."""
     return click.option(
         "--set",
         "overrides",
@@ -49,17 +49,17 @@ def set_option(function: F) -> F:
 
 
 def out_option(function: F) -> F:
-    """--out FILE."""
+    """Add the option `--out FILE` to a command."""
     return click.option("--out", type=FILE, metavar="FILE", help="Where to write the result.")(function)
 
 
 def overwrite_option(function: F) -> F:
-    """--overwrite."""
+    """Add the option `--overwrite` to a command."""
     return click.option("--overwrite", is_flag=True, help="Replace whatever the result file holds.")(function)
 
 
 def alpha_option(function: F) -> F:
-    """--alpha FILE."""
+    """Add the option `--alpha FILE` to a command."""
     return click.option(
         "--alpha",
         "alpha_path",
@@ -70,7 +70,7 @@ def alpha_option(function: F) -> F:
 
 
 def output_options(function: F) -> F:
-    """--json and --quiet."""
+    """Add the options `--json` and `--quiet` to a command."""
     function = click.option("--quiet", "-q", is_flag=True, help="Say nothing but mistakes.")(function)
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")(function)
 
@@ -132,7 +132,7 @@ def check_design(engine: "Evaluator", alpha: "NDArray[np.float64]", path: Path |
 
 
 def result_path(out: Path | None, case: "Case", kind: str = "") -> Path:
-    """--out, else results/<case>[.<kind>].h5."""
+    """The path of the result: `--out`, or else results/<case>[.<kind>].h5."""
     if out is not None:
         return out
     return Path("results") / (f"{case.name}.{kind}.h5" if kind else f"{case.name}.h5")

@@ -16,7 +16,7 @@ _EVERY = 10.0
 
 
 class Output:
-    """How much a command says, and in which form.
+    """How much a command prints, and whether for people or as JSON.
 
     json: one JSON object is the only thing on standard output. quiet: nothing is said but mistakes (and the
     JSON object, where it was asked for).
@@ -35,12 +35,12 @@ class Output:
         self.notice(sentence)
 
     def say(self, text: str = "") -> None:
-        """A line of the result, for people."""
+        """Print a line of the result, for people to read."""
         if not self.quiet and not self.json:
             write(sys.stdout, text)
 
     def table(self, rows: Iterable[Sequence[str]], indent: str = "  ") -> None:
-        """Aligned columns of the result."""
+        """Print rows of the result as aligned columns."""
         for line in aligned(rows, indent):
             self.say(line)
 
@@ -50,7 +50,7 @@ class Output:
             write(sys.stderr, sentence)
 
     def document(self, content: Mapping[str, Any]) -> None:
-        """The result, for machines."""
+        """Print the result as JSON, where that is wanted."""
         if self.json:
             plainly = (sys.stdout.encoding or "").lower().replace("-", "") != "utf8"
             write(sys.stdout, json.dumps(plain(content), ensure_ascii=plainly, allow_nan=False))
@@ -94,7 +94,7 @@ def harmless(text: str) -> str:
 
 
 def write(stream: TextIO, text: str) -> None:
-    """A line; quietly nowhere once the reader has gone. Raises OutputError where standard output cannot be written."""
+    """Write a line; nothing once nobody reads any more. OutputError where standard output cannot be written."""
     try:
         print(harmless(text), file=stream, flush=True)
     except BrokenPipeError:
@@ -123,7 +123,7 @@ def _is_numeric(cells: list[str]) -> bool:
 
 
 def plain(value: Any) -> Any:
-    """The same in what JSON has: arrays as lists, NaN and infinities as null."""
+    """A value as JSON can have it: arrays as lists, NaN and infinities as null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, str) or value is None or isinstance(value, (bool, int)):
@@ -138,7 +138,7 @@ def plain(value: Any) -> Any:
 
 
 def number(value: float, digits: int = 6) -> str:
-    """A number for people."""
+    """A number with so many digits, for people to read."""
     return f"{value:.{digits}g}"
 
 

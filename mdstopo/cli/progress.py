@@ -52,7 +52,7 @@ class Rate:
 
 
 def line(progress: "Progress") -> str:
-    """One iteration in words."""
+    """One iteration of the optimiser in words."""
     start = f"start {progress.start + 1}/{progress.starts}, " if progress.starts > 1 else ""
     return (
         f"{start}iteration {progress.iteration}/{progress.max_iterations}: "
@@ -62,7 +62,7 @@ def line(progress: "Progress") -> str:
 
 
 class Plain(displays.Plain["Progress"]):
-    """A line every few seconds."""
+    """The progress of a run as a line every few seconds, for logs."""
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
         super().__init__(clock)
@@ -78,7 +78,7 @@ class Plain(displays.Plain["Progress"]):
 
 
 class Live(displays.Live["Progress"]):
-    """A line that changes in place."""
+    """The progress of a run as a line that changes in place."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -96,7 +96,7 @@ def resume_command(view: "ResultView") -> str:
 
 
 def values_text(values: "NDArray[np.generic]", shown: int = 6) -> str:
-    """The values of a variable; the first of many."""
+    """The values of a variable as text; of many only the first."""
     more = f", ... ({len(values)} values)" if len(values) > shown else ""
     return ", ".join(number(value, 9) for value in values[:shown]) + more
 

@@ -100,7 +100,7 @@ def _run(output: Output, scenes: "Sequence[Scene]", markdown: bool) -> "list[Out
 
 
 def row(outcome: "Outcome") -> list[str]:
-    """The cells of the table for an outcome."""
+    """The cells of the table's row for one scene."""
     scene = outcome.scene
     return [
         scene.name,
@@ -119,7 +119,7 @@ def _expectation(scene: "Scene") -> str:
 
 
 def told(outcome: "Outcome") -> str:
-    """How a scene ended, in words."""
+    """How a scene has ended, in words."""
     if outcome.error is not None:
         return f"its error is {number(outcome.error, 3)}"
     return f"it {outcome.outcome if outcome.outcome.endswith('s') else 'is ' + outcome.outcome}: {outcome.message}"

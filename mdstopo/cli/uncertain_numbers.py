@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def lines_of(conclusion: "Conclusion | None", name: str) -> list[list[str]]:
-    """What becomes of an objective, or of `constraints[i]`, beside its value; nothing in a certain case."""
+    """Lines on the sample's results for an objective, or for `constraints[i]`; none in a certain case."""
     found = None if conclusion is None else conclusion.of(name)
     if conclusion is None or found is None:
         return []
@@ -29,7 +29,7 @@ def lines_of(conclusion: "Conclusion | None", name: str) -> list[list[str]]:
 
 
 def document_of(conclusion: "Conclusion | None") -> dict[str, Any] | None:
-    """The results as values for JSON, by name."""
+    """The results on a fresh sample as values for JSON, by name."""
     if conclusion is None:
         return None
     return {
@@ -48,7 +48,7 @@ def document_of(conclusion: "Conclusion | None") -> dict[str, Any] | None:
 
 
 def say_result(output: Output, view: "ResultView") -> None:
-    """What a result file holds of it."""
+    """Print what a result file holds of an uncertain case."""
     if "uncertainty/robust" not in view.arrays:
         return
     part, check = view.under("uncertainty"), view.under("uncertainty/validation")

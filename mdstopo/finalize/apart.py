@@ -49,7 +49,8 @@ def free_name(whole: str, place: int, taken: set[str]) -> str:
 
 
 def unlike(case: Case, kept: IndexArray) -> set[str]:
-    """Groups of which different members are kept though member k of each has the same value: to be taken apart.
+    """Groups that have to be taken apart: of which different members are kept though member k of each has the same
+    value.
 
     So are those whose members k go with theirs by other variables or by `mirrored`.
     """

@@ -252,7 +252,7 @@ def _used_points(content: Plain, members: Plain) -> set[str]:
 def _objectives(stated: Plain, groups: Mapping[str, list[str]], told: list[str]) -> Plain:
     found: Plain = {}
     for name, objective in stated.items():
-        versions = _looking(objective, groups)
+        versions = _versions(objective, groups)
         if len(versions) == 1:
             found[name] = versions[0]
         else:
@@ -260,7 +260,7 @@ def _objectives(stated: Plain, groups: Mapping[str, list[str]], told: list[str])
     return found
 
 
-def _looking(stated: Plain, groups: Mapping[str, list[str]]) -> list[Plain]:
+def _versions(stated: Plain, groups: Mapping[str, list[str]]) -> list[Plain]:
     """What has a response, once for each group that `member_force` has now to look at."""
     response = stated["response"]
     if isinstance(response, dict) and "expression" in response:
@@ -318,7 +318,7 @@ def _constraints(
     found: list[Plain] = []
     for i, (entry, row) in enumerate(zip(stated, case.constraints, strict=True)):
         if not isinstance(row, VolumeRow):
-            versions = _looking(entry, groups)
+            versions = _versions(entry, groups)
             if len(versions) == 1 or (versions and row.sense == "limit" and REDUCTIONS[row.over_time].is_largest):
                 found += versions
             else:

@@ -30,7 +30,8 @@ FAR, TURNED = 0.05, 0.1
 
 @dataclass(frozen=True)
 class Comparison:
-    """lost: why the final design does not rest at the equilibrium of the full one; moved: how far that has moved.
+    """How two equilibria differ. lost: why the final design does not rest at that of the full one; moved: how far it
+    has moved.
 
     Both in words, and empty where there is nothing to tell.
     """

@@ -45,7 +45,7 @@ SHORTER = 10.0
 
 @dataclass(frozen=True)
 class Column:
-    """One design, evaluated: its name in the table, how many members it has, and what was found."""
+    """A column of the table that compares designs: its name, how many members it has, and what was found."""
 
     title: str
     members: int
@@ -143,7 +143,7 @@ def ready(case: Case, design: FloatArray, keep: int | None, threshold: float | N
 
 
 def tied(alpha: FloatArray, kept: IndexArray) -> int:
-    """How many members that are not kept have as large an alpha (N,) as the smallest that is."""
+    """How many members that are left out have as large an alpha (N,) as the smallest that is kept."""
     least = alpha[kept].min(initial=np.inf)
     return int(np.count_nonzero(alpha >= least)) - len(kept)
 

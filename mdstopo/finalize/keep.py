@@ -36,7 +36,8 @@ def chosen(alpha: FloatArray, keep: int | None, threshold: float | None, slots: 
 
 
 def one_alpha(case: Case) -> IndexArray | None:
-    """(N,) which alphas are one, as a number of each (`shared`, `mirrored`); None where each is its own."""
+    """(N,) a number for each alpha, the same where alphas are one variable (`shared`, `mirrored`); None where none
+    are."""
     return slots_of({group.name: len(group) for group in case.design_groups}, case.shared, case.mirrored)
 
 

@@ -14,6 +14,8 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula
 from mdstopo.case.errors import CaseError
+from mdstopo.case.joints import JOINTS
+from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.number_rows import Signals
 from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
@@ -25,13 +27,6 @@ from mdstopo.case.start_rotations import about_axis
 from mdstopo.case.words import inside, shown
 from mdstopo.case.yaml_text import text_of
 from mdstopo.finalize.document import Plain, content_of
-
-_ANGLES = {
-    "angle": "rotation",
-    "angular_velocity": "angular_velocity",
-    "angular_acceleration": "angular_acceleration",
-}
-_SAME = ("energy", "member_force", "joint_force", "joint_moment")
 
 
 def lifted(case: Case, axis: tuple[float, float, float] = (0.0, 0.0, 1.0), angle: float = 0.0) -> str:
@@ -89,8 +84,8 @@ class _Lift:
             "members": self.each(self.group),
             "loads": self.each(self.load),
             "load_cases": self.each(self.load_case),
-            "objectives": self.each(self.looked_at),
-            "constraints": self.each(self.looked_at),
+            "objectives": self.each(self.aim),
+            "constraints": self.each(self.aim),
         }
 
     def refuse(self, path: str, words: str) -> None:
@@ -170,17 +165,19 @@ class _Lift:
         ]
 
     def joint(self, old: Plain, path: str) -> Plain:
-        """A pin turns about the normal; a weld on ground is where the plane has it."""
-        del path
+        """A pin turns about the normal; what is on ground and states no point is where the plane has it."""
+        kind = JOINTS[old["type"]]
+        if kind.type not in SPATIAL_JOINTS:
+            self.refuse(path, "what becomes of this joint in space is not known")
         new = {key: value for key, value in old.items() if key != "at"}
         at = old.get("at")
-        if at is None and old["type"] == "fixed" and old["bodies"][1] == GROUND:
+        if at is None and old["bodies"][1] == GROUND:
             at = [0, 0]
         if at is not None:
             new["at"] = self.place(at)
-        if old["type"] == "prismatic":
+        if "axis" in old:
             new["axis"] = self.vector(old["axis"])
-        if old["type"] == "revolute":
+        if kind.turns_about_normal:
             new["axis"] = self.normal()
         return new
 
@@ -314,7 +311,7 @@ class _Lift:
         lifts = {key: self.sections()[key] for key in ("gravity", "loads", "motions")}
         return {key: lifts.get(key, _as_it_is)(value, inside(path, key)) for key, value in (old or {}).items()}
 
-    def looked_at(self, old: Plain, path: str) -> Plain:
+    def aim(self, old: Plain, path: str) -> Plain:
         """An objective or a constraint."""
         response = old.get("response")
         if not isinstance(response, Mapping):
@@ -327,11 +324,9 @@ class _Lift:
         """A response; seen from ground in a tilted plane only what has no direction there."""
         kind, here = RESPONSES[word], inside(path, word)
         from_ground = self.is_tilted and keys.get("relative_to", GROUND) == GROUND
-        if word in _SAME:
-            return {word: keys}
-        if word == "expression":
+        if not kind.kernels:  # an expression of others
             return {word: {**keys, "of": self.parts(keys["of"], over_time, inside(here, "of"))}}
-        if word in _ANGLES:
+        if kind.is_component:
             if kind.is_position and self.angle_at_start(keys) != 0.0:
                 words = "it is not 0 at the start, from which a rotation in space counts"
                 self.refuse(here, words)
@@ -339,10 +334,11 @@ class _Lift:
             if from_ground and not REDUCTIONS[over_time].ignores_sign:
                 words = f"in a tilted plane only its size is a component, and over_time {over_time} needs its sign"
                 self.refuse(here, words)
-            return {_ANGLES[word]: {**keys, "component": component}}
+            return {kind.in_space: {**keys, "component": component}}
         if not kind.of_point:
-            self.refuse(here, "what becomes of this response in space is not known")
-            return {word: keys}
+            if not kind.in_space:
+                self.refuse(here, "what becomes of this response in space is not known")
+            return {kind.in_space or word: keys}
         if from_ground and keys.get("component", "norm") != "norm":
             self.refuse(inside(here, "component"), "in a tilted plane it is no single component")
         return {word: {**keys, "at": self.vector(keys["at"], _frame(keys))} if "at" in keys else keys}
@@ -415,7 +411,7 @@ def _stated(signal: Signal) -> Any:
 
 
 def read_signals(value: Any, names: tuple[str, ...]) -> tuple[Signal, ...]:
-    """A quantity over time that has been read before."""
+    """The signals of a quantity over time, which has been read before without a mistake."""
     reading = Reading(Path())
     read: tuple[Signal, ...] = Signals(names, formula=True).read(node_of(value, ""), "", reading)
     assert not reading.mistakes

@@ -46,7 +46,7 @@ def differ(case: Case, group: MemberGroup) -> bool:
 
 
 def given(case: Case, group: MemberGroup, i: int, values: FloatArray) -> Given:
-    """What the variables of a case say about member `i` of a group, at their values (P,)."""
+    """The values that the variables of a case, at values (P,), give to the law of member `i` of a group."""
     found: dict[int, dict[str, float]] = {}
     first = 0
     for each in case.variables:
@@ -64,7 +64,8 @@ def with_values(laws: tuple[Law, ...], values: Given) -> list[Law]:
 
 
 def never_late(stated: dict[str, Any], case: Case) -> dict[str, Any]:
-    """A law as the file states it. One that would end before it begins never acts: it begins when all is over."""
+    """A law as the file states it; one that would end before it begins never acts, and begins after the end of the
+    motion."""
     begin, until = stated.get("active_from"), stated.get("active_until")
     if begin is None or until is None or isinstance(begin, str) or isinstance(until, str) or begin < until:
         return stated

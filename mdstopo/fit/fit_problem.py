@@ -50,14 +50,15 @@ class FitProblem:
         self._rates: list[FloatArray] = []
 
     def with_values(self, values: Sequence[FloatArray]) -> "FitProblem":
-        """The same fit of other values (n,) of each series; what is compiled and known of the scene is shared."""
+        """The same fit of other measured values (n,) of each series; what is compiled and known of the scene is
+        shared."""
         other = copy.copy(self)
         other.measured = [each._replace(y=y) for each, y in zip(self.measured, values, strict=True)]
         return other
 
     @cached_property
     def parts(self) -> list[slice]:
-        """Where the residuals of each series are."""
+        """The slice of the residuals that each series has."""
         ends = np.cumsum([0, *(len(each.t) for each in self.measured)]).tolist()
         return [slice(first, last) for first, last in itertools.pairwise(ends)]
 
@@ -68,7 +69,7 @@ class FitProblem:
 
     @property
     def simulations(self) -> int:
-        """Motions computed so far."""
+        """How many motions have been computed so far."""
         return self.predictions.simulations
 
     def misfit(self, x: FloatArray) -> tuple[str, FloatArray]:

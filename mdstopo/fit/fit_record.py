@@ -85,7 +85,7 @@ def _motions(run: FitRun) -> dict[str, Any]:
     if run.found is None:
         return {}
     numbers = run.problem.numbers
-    evaluator = Evaluator(numbers.case_at(run.found.x[: len(numbers.keys)]), beside=False)
+    evaluator = Evaluator(numbers.case_at(run.found.x[: len(numbers.keys)]), in_background=False)
     names = dict.fromkeys(each.load_case for each in run.problem.fit.series)
     return {name: evaluator.trajectory(evaluator.case.start, name) for name in names}
 
@@ -187,7 +187,7 @@ def _deviations(problem: FitProblem, deviation: FloatArray) -> list[float]:
 
 
 def asked(problem: FitProblem) -> str:
-    """A digest of what was asked and measured: a run goes on only where it is the same."""
+    """A digest of the question and the measurements: a fit goes on only where it is the same."""
     digest = hashlib.sha256(describe(problem.case).encode())
     digest.update(repr(problem.fit).encode())
     for each in problem.measured:
@@ -287,7 +287,7 @@ def _read_series(view: ResultView) -> list[dict[str, Any]]:
 
 
 def plain(value: Any) -> Any:
-    """The same in what JSON has: arrays as lists, numbers that are not finite as null."""
+    """A value as JSON can have it: arrays as lists, numbers that are not finite as null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):

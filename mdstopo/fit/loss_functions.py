@@ -17,25 +17,25 @@ Loss = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 
 
 def linear(r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """rho = r^2."""
+    """Least squares: rho = r^2."""
     return r**2, np.ones_like(r), np.ones_like(r)
 
 
 def huber(r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """rho = r^2 where |r| <= 1, else 2 |r| - 1."""
+    """Huber's loss: rho = r^2 where |r| <= 1, else 2 |r| - 1."""
     size = np.abs(r)
     near = size <= 1.0
     return np.where(near, r**2, 2.0 * size - 1.0), 1.0 / np.maximum(size, 1.0), near.astype(np.float64)
 
 
 def soft_l1(r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """rho = 2 (sqrt(1 + r^2) - 1)."""
+    """A smooth loss like Huber's: rho = 2 (sqrt(1 + r^2) - 1)."""
     root = np.sqrt(1.0 + r**2)
     return 2.0 * (root - 1.0), 1.0 / root, 1.0 / root**3
 
 
 def cauchy(r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """rho = ln(1 + r^2)."""
+    """Cauchy's loss: rho = ln(1 + r^2)."""
     z = r**2
     return np.log1p(z), 1.0 / (1.0 + z), (1.0 - z) / (1.0 + z) ** 2
 

@@ -74,7 +74,7 @@ class Numbers:
         return self._read(x)
 
     def chain(self, x: FloatArray) -> FloatArray:
-        """(L, n): their derivatives by the numbers at x (n,)."""
+        """(L, n) the derivatives of laws' parameters by the numbers at x (n,)."""
         if self.straight is not None:
             return self.straight[1]
         columns = []
@@ -85,7 +85,7 @@ class Numbers:
 
     @cached_property
     def straight(self) -> tuple[FloatArray, FloatArray] | None:
-        """Constant (L,) and matrix (L, n) where the parameters follow from all numbers in straight lines, else None.
+        """Constant (L,) and matrix (L, n) where laws' parameters are linear functions of all numbers, else None.
 
         None, too, where a number is differentiated by differences and so may be anywhere in them.
         """
@@ -194,12 +194,12 @@ class Numbers:
     @cached_property
     def _arrays(self) -> Mapping[str, Any]:
         """The arrays of each load case at the start."""
-        return {name: scene.model for name, scene in Evaluator(self._base, beside=False).scenes.items()}
+        return {name: scene.model for name, scene in Evaluator(self._base, in_background=False).scenes.items()}
 
     def _changed_arrays(self, held: Case) -> set[str]:
         """Names of arrays in which a case's scenes differ from those at the start."""
         found: set[str] = set()
-        for name, scene in Evaluator(held, beside=False).scenes.items():
+        for name, scene in Evaluator(held, in_background=False).scenes.items():
             before, now = self._arrays[name]._asdict(), scene.model._asdict()
             found |= {key for key, array in now.items() if not np.array_equal(array, before[key])}
         return found

@@ -114,14 +114,14 @@ class Predictions:
             at = self.numbers.initial if self.numbers.laws_alone else x
             there = self.numbers.case_at(at)
             solver = replace(there.solver, integrator=self._integrator)
-            self._kept = key, Evaluator(replace(there, solver=solver), beside=False)
+            self._kept = key, Evaluator(replace(there, solver=solver), in_background=False)
         return self._kept[1]
 
     @cached_property
     def _integrator(self) -> str:
         """The one that suits the numbers as stated, for all x: else `auto` chose anew, and differences were of two."""
         try:
-            return Evaluator(self.numbers.case_at(self.numbers.initial), beside=False).integrator
+            return Evaluator(self.numbers.case_at(self.numbers.initial), in_background=False).integrator
         except CaseError:  # the first motion says why
             return self.case.solver.integrator
 
@@ -228,7 +228,7 @@ class Predictions:
         def at(moved: FloatArray) -> FloatArray:
             case = self.numbers.case_at(moved)
             tight = replace(case, solver=replace(case.solver, tolerance=tolerance))
-            predicted, _ = self._observed(Evaluator(tight, beside=False), moved, delays, False)
+            predicted, _ = self._observed(Evaluator(tight, in_background=False), moved, delays, False)
             if predicted.trouble:
                 raise MotionError(f"{self.numbers.keys[i]} beside {x[i]:.10g}: {predicted.trouble}")
             return np.concatenate(predicted.values)
@@ -243,7 +243,7 @@ class MotionError(Exception):
 
 def _models(case: Case) -> dict[str, GeneralModel]:
     """The arrays of each load case."""
-    return {name: cast(GeneralModel, each.model) for name, each in Evaluator(case, beside=False).scenes.items()}
+    return {name: cast(GeneralModel, each.model) for name, each in Evaluator(case, in_background=False).scenes.items()}
 
 
 def _trouble(driver: GeneralDriver, found: Observed) -> str:

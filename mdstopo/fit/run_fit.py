@@ -64,7 +64,7 @@ class FitRun:
 
     @property
     def shown(self) -> Evaluated | None:
-        """What the fit has come to so far: the minimum, before there is one the last evaluation."""
+        """The state of the fit that is displayed: the minimum, or before there is one the last evaluation."""
         if self.found is None:
             return self.latest
         return Evaluated(self.found.x, self.found.misfit, self.found.deviation)
@@ -89,7 +89,7 @@ def run_fit(
     stop: Callable[[], bool] = lambda: False,
     passing: Callable[[FitRun], None] = lambda _: None,
 ) -> FitRun:
-    """Fit a case.
+    """Fit the numbers of a case to measurements.
 
     problem: what is fitted.
     points: of profiles, on each side of an estimate; 0: none.

@@ -26,7 +26,7 @@ AT_BOUND = 1e-7
 
 @dataclass(frozen=True)
 class Direction:
-    """A combination of estimates that the data cannot tell, or hardly: shares of each way between the bounds.
+    """A combination of estimates that the data do not determine, or hardly: shares of each way between the bounds.
 
     change: by how many standard deviations all predictions change, from bound to bound.
     """

@@ -21,7 +21,7 @@ def is_number(part: Expression, value: float) -> bool:
 
 
 def add(a: Expression, b: Expression) -> Expression:
-    """a + b."""
+    """The expression a + b, simplified."""
     if is_number(a, 0.0):
         return b
     if is_number(b, 0.0):
@@ -34,7 +34,7 @@ def add(a: Expression, b: Expression) -> Expression:
 
 
 def subtract(a: Expression, b: Expression) -> Expression:
-    """a - b."""
+    """The expression a - b, simplified."""
     if is_number(b, 0.0):
         return a
     if is_number(a, 0.0):
@@ -45,7 +45,7 @@ def subtract(a: Expression, b: Expression) -> Expression:
 
 
 def negate(a: Expression) -> Expression:
-    """-a."""
+    """The expression -a, simplified."""
     if a.operator == NUMBER:
         return number(-a.value + 0.0)
     if a.operator == "neg":
@@ -54,7 +54,7 @@ def negate(a: Expression) -> Expression:
 
 
 def multiply(a: Expression, b: Expression) -> Expression:
-    """a b."""
+    """The expression a b, simplified."""
     if is_number(a, 0.0) or is_number(b, 0.0):
         return ZERO
     if is_number(a, 1.0):
@@ -77,7 +77,7 @@ def multiply(a: Expression, b: Expression) -> Expression:
 
 
 def divide(a: Expression, b: Expression) -> Expression:
-    """a / b."""
+    """The expression a / b, simplified."""
     if is_number(b, 1.0):
         return a
     if is_number(a, 0.0) and not is_number(b, 0.0):
@@ -90,14 +90,14 @@ def divide(a: Expression, b: Expression) -> Expression:
 
 
 def power(a: Expression, b: Expression) -> Expression:
-    """a^b."""
+    """The expression a^b, simplified."""
     if is_number(b, 0.0) or is_number(a, 1.0):
         return ONE
     return a if is_number(b, 1.0) else _folded("^", a, b)
 
 
 def choose(condition: Expression, a: Expression, b: Expression) -> Expression:
-    """`if`."""
+    """The expression `if(condition, a, b)`, simplified."""
     return a if a is b else operation("if", condition, a, b)
 
 
@@ -112,7 +112,7 @@ def where_not_zero(part: Expression, make: Callable[[Expression], Expression]) -
 
 
 def call(function: str, *operands: Expression) -> Expression:
-    """Any other operation."""
+    """The expression of any other function of operands."""
     return _folded(function, *operands)
 
 
@@ -152,7 +152,7 @@ def substituted(root: Expression, by_part: Mapping[Expression, Expression]) -> E
 
 
 def simplified(root: Expression) -> Expression:
-    """An expression without what does nothing."""
+    """An expression without parts that change nothing, such as sums with 0 and products with 1."""
     return substituted(root, {})
 
 

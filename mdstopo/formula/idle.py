@@ -20,7 +20,7 @@ MOST, LOOKS = 8, 100
 
 
 class Idle(NamedTuple):
-    """Sides of switches on which formulas are 0.
+    """A combination of sides of switches on which formulas are 0.
 
     which, sides: the switches as bits, and on which side each has to be. place, above: where place is not negative, the
     parameter there has to be above this.
@@ -32,7 +32,7 @@ class Idle(NamedTuple):
     above: float = 0.0
 
     def holds(self, mode: int, parameters: Sequence[float]) -> bool:
-        """Whether it is so."""
+        """Whether the formulas are 0 because of this, at these sides of switches and these parameters."""
         return mode & self.which == self.sides and (self.place < 0 or parameters[self.place] > self.above)
 
 
@@ -144,7 +144,7 @@ def _parameter_above(exponent: Expression) -> tuple[int, float]:
 
 
 def as_numbers(sides: Sequence[Idle]) -> Iterator[float]:
-    """How many there are, and of each its four numbers: what kernels read."""
+    """The combinations as numbers for kernels: how many there are, and of each four numbers."""
     yield float(len(sides))
     for each in sides:
         yield from (float(each.which), float(each.sides), float(each.place), each.above)

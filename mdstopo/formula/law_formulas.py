@@ -120,7 +120,7 @@ def why_too_large(groups: Callable[[], tuple[Group, ...]]) -> str:
 
 
 def by_place(names: tuple[str, ...]) -> dict[Expression, Expression]:
-    """What stands for the names of numbers in formulas: "p 0" and so on, by their places."""
+    """The names that stand for numbers in formulas: "p 0" and so on, by their places."""
     return {name(word): name(f"p {place}") for place, word in enumerate(names)}
 
 
@@ -152,9 +152,9 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
     words = [*(f"p {place}" for place in range(len(names))), "l0"]
     near = [_near(switch.margin) for switch in found.switches]
     margins = [divide(switch.margin, size) for switch, size in zip(found.switches, near, strict=True)]
-    looked_at = limited([(f, ONE), (v, ONE), *((each.margin, each.relevant) for each in found.switches)])
+    guards = limited([(f, ONE), (v, ONE), *((each.margin, each.relevant) for each in found.switches)])
     groups = [
-        group_of((f, derivative(f, "x"), derivative(f, "xd"), v, derivative(v, "x")), looked_at),
+        group_of((f, derivative(f, "x"), derivative(f, "xd"), v, derivative(v, "x")), guards),
         group_of((lowest_of(margins, found.switches),)),
     ]
     for word in words:
@@ -168,11 +168,11 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
     by_time = derivative(f, "t")
     groups.append(group_of((by_time,), limited([(by_time, ONE)])))
     sharp = sharp_switches(f, [switch.margin for switch in found.switches], MOTION)
-    return Program(tuple(groups), len(names), len(found.switches), idle_sides((f, v), looked_at), sharp)
+    return Program(tuple(groups), len(names), len(found.switches), idle_sides((f, v), guards), sharp)
 
 
 def group_of(values: tuple[Expression, ...], guards: Iterable[Guard] = ()) -> Group:
-    """A group, simplified."""
+    """Expressions that are evaluated together, simplified, with the conditions under which they have values."""
     made = (Guard(simplified(each.part), simplified(each.reached)) for each in guards)
     return Group(tuple(simplified(each) for each in values), tuple(each for each in made if _may_fail(each.part)))
 
@@ -203,7 +203,7 @@ def lowest_of(margins: list[Expression], switches: tuple[Switch, ...]) -> Expres
 
 
 def limited(roots: list[tuple[Expression, Expression]]) -> list[Guard]:
-    """The operations that may have no value, of formulas that are evaluated where the other number is 1."""
+    """The operations in formulas that may have no value, each with a number that is 1 where it is evaluated."""
     ways = ways_to(*roots)
     return [Guard(part, way) for part, way in ways.items() if _may_fail(part) and not is_number(way, 0.0)]
 

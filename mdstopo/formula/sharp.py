@@ -20,7 +20,7 @@ _POINTS, _ALIKE = 3, 1e-9
 
 
 def sharp_switches(formula: Expression, margins: Sequence[Expression], moving: Sequence[str]) -> int:
-    """The switches at which a fractional power in a formula begins, as bits: their margin vanishes with its base.
+    """The switches at which the base of a fractional power vanishes, as bits: slopes grow like a root behind these.
 
     margins: of the switches. moving: names that change during a motion.
     """

@@ -40,26 +40,27 @@ class TooManySwitchesError(Exception):
 
 
 class Switch(NamedTuple):
-    """margin: an expression whose sign the bit tells; relevant: of bits, 1 where the switch is evaluated, else 0."""
+    """A switch of a formula. margin: an expression whose sign sets its bit; relevant: an expression of bits, 1 where
+    the switch is evaluated, else 0."""
 
     margin: Expression
     relevant: Expression
 
 
 class Smooth(NamedTuple):
-    """Formulas in which bits stand for comparisons, and the switches behind the bits, inner ones first."""
+    """Formulas in which comparisons have become bits, and the switches that set the bits, inner ones first."""
 
     formulas: tuple[Expression, ...]
     switches: tuple[Switch, ...]
 
 
 def bit(place: int) -> Expression:
-    """The bit of a switch."""
+    """The expression for the bit of a switch: 1 on one of its sides, 0 on the other."""
     return name(f"bit {place}")
 
 
 def is_set(place: int) -> Expression:
-    """That the bit of a switch is 1, for an `if`."""
+    """The condition of an `if`: that the bit of a switch is 1."""
     return operation(">", bit(place), HALF)
 
 
@@ -183,7 +184,7 @@ def _note(root: Expression, reached: Expression, relevant: list[Expression]) -> 
 
 
 def ways_to(*roots: tuple[Expression, Expression]) -> dict[Expression, Expression]:
-    """Of every part of some formulas, 1 where it is evaluated; of the formulas themselves that is stated with them.
+    """Of every part of some formulas, the condition (1 or 0) under which it is evaluated.
 
     Of what an `if` chooses from, one is evaluated.
     """
@@ -205,7 +206,7 @@ def ways_to(*roots: tuple[Expression, Expression]) -> dict[Expression, Expressio
 
 
 def either_of(a: Expression, b: Expression) -> Expression:
-    """1 where one of two truths is 1."""
+    """The expression that is 1 where one of two conditions, each 0 or 1, is 1."""
     if a is b or is_number(b, 0.0) or is_number(a, 1.0):
         return a
     if is_number(a, 0.0) or is_number(b, 1.0):

@@ -92,12 +92,12 @@ def _made(operator: str, operands: tuple[Expression, ...], value: float, word: s
 
 
 def number(value: float) -> Expression:
-    """A number."""
+    """The expression that is a number."""
     return _made(NUMBER, (), float(value), "")
 
 
 def name(word: str) -> Expression:
-    """A name."""
+    """The expression that is a name."""
     return _made(NAME, (), 0.0, word)
 
 
@@ -124,7 +124,7 @@ def parts(*roots: Expression) -> Iterator[Expression]:
 
 
 def names_in(*roots: Expression) -> list[str]:
-    """The names in some expressions, each once."""
+    """The names that occur in expressions, each once."""
     return [part.word for part in parts(*roots) if part.operator == NAME]
 
 

@@ -25,7 +25,7 @@ _one_at_a_time = threading.Lock()
 
 
 def perform_alone(setting: Setting, job: Job) -> Any:
-    """The result of one piece; a process does one after the other."""
+    """The result of one job; a process of the cluster does one after the other."""
     with _one_at_a_time:
         return perform(setting, job)
 
@@ -118,5 +118,5 @@ class Cluster:
             yield futures[future], future.result() if error is None else Lost(f"the cluster failed on it: {error}")
 
     def close(self) -> None:
-        """Leave the cluster to itself."""
+        """Leave the cluster running, and give up the connection to it."""
         self._client.close()

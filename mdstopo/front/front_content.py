@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Found]) -> Datasets:
-    """What `pareto/...` holds of a finished front."""
+    """The datasets below `pareto/` of a finished front, by their paths."""
     w, m = directions.shape
     signs = np.array([sign_of(objective) for objective in case.objectives])
     objectives = np.full((w, m), np.nan)
@@ -109,7 +109,7 @@ class Quality:
     reference: float = REFERENCE
 
     def numbers(self) -> dict[str, float]:
-        """The scalars."""
+        """Those measures of the front that are single numbers, by their names."""
         return {"hypervolume": self.hypervolume, "spacing": self.spacing, "largest_gap": self.largest_gap}
 
 

@@ -27,7 +27,7 @@ from mdstopo.workers.worker_pool import Parent, Perform, StoppedError
 
 @dataclass(frozen=True)
 class Setting:
-    """What all pieces have in common: the case, and its hash; pieces of a sweep bring a case of their own."""
+    """What all jobs have in common: the case, and its hash; jobs of a sweep bring a case of their own."""
 
     case: Case
     case_key: str
@@ -35,7 +35,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Trial:
-    """One case of a sweep."""
+    """One run of a sweep: a case with values for the keys that vary."""
 
     case: Case
     key: str
@@ -51,7 +51,7 @@ _engines: OrderedDict[str, Engine] = OrderedDict()
 def perform(
     setting: Setting, job: Job, stop: Callable[[], bool] | None = None, keep: Callable[[State], None] | None = None
 ) -> Any:
-    """The result of one piece; whatever goes wrong in it is its status, so that it fails nothing else.
+    """The result of one job; whatever goes wrong in it becomes its status, so that nothing else fails.
 
     keep: is given the states of a task's optimiser. Raises StoppedError where `stop` says so before the end.
     """
@@ -69,7 +69,7 @@ def perform(
 
 
 def open_jobs(setting: Setting) -> Perform:
-    """In a worker: what does one piece after the other."""
+    """In a worker: make the function that does one job after the other."""
 
     def work(job: Job, parent: Parent) -> Any:
         return perform(setting, job, parent.stopped, lambda state: parent.keep(state.to_arrays))

@@ -22,11 +22,11 @@ Keep = Callable[[int, State], None]
 
 
 def ignore_both(place: int, state: State) -> None:
-    """Keep nothing."""
+    """Do nothing with the state of a job: it is not saved."""
 
 
 class Pool(Protocol):
-    """Does pieces of work. `results` yields (place, result) as they are done, and ends early where it is to stop.
+    """Does jobs. `results` yields (place, result) as they are done, and ends early where it is to stop.
 
     keep: is given (place, state) of tasks that are being worked on, as time goes by. at_once: how many pieces are
     worked on together; 0 where that is not known.
@@ -39,7 +39,7 @@ class Pool(Protocol):
 
 
 class Here:
-    """One piece after the other, in this process."""
+    """A pool that does one job after the other, in this process."""
 
     at_once = 1
 
@@ -48,7 +48,7 @@ class Here:
         self._stop = stop
 
     def results(self, jobs: Sequence[Job], keep: Keep = ignore_both) -> Iterator[tuple[int, Any]]:
-        """In order."""
+        """Yield the results of jobs, in the order of these."""
         for place, job in enumerate(jobs):
             if self._stop():
                 return
@@ -59,7 +59,7 @@ class Here:
             yield place, result
 
     def close(self) -> None:
-        """Do nothing: no processes are held."""
+        """Do nothing: this pool has no processes."""
 
 
 class Processes:
@@ -73,7 +73,7 @@ class Processes:
         self.at_once = workers
 
     def results(self, jobs: Sequence[Job], keep: Keep = ignore_both) -> Iterator[tuple[int, Any]]:
-        """Results as they are done."""
+        """Yield the results of jobs as these are done, by processes beside this one."""
         reached: dict[int, State] = {}
 
         def job(place: int) -> Job:

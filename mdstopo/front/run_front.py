@@ -56,7 +56,7 @@ LOOK = 2
 
 @dataclass(frozen=True)
 class Ask:
-    """What the user asks for. directions (W, m); method: of the case where empty; starts: of every solve."""
+    """The front that the user asks for. directions (W, m); method: of the case where empty; starts: of every solve."""
 
     directions: Floats
     method: str = ""
@@ -65,7 +65,7 @@ class Ask:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A front in the making: best by point, points that are being worked on, tasks done.
+    """How far a front has come: best by point, points that are being worked on, tasks done.
 
     left: seconds that are left, a guess; NaN where there is none, because more tasks than usual have been needed.
     """
@@ -438,5 +438,5 @@ class _FrontRun:
 
 
 def verdict(front: Front) -> tuple[RunStatus, str]:
-    """A front's status, and how its points stand."""
+    """The status of a front in words, and how many of its points ended how."""
     return together([RunStatus.FAILED if point is None else point.status for point in front.points], "points")

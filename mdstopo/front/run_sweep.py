@@ -298,5 +298,5 @@ def shortest(value: float) -> str:
 
 
 def lost(case: Case, result: Lost) -> Found:
-    """What stands for a run that no worker finished; its key is empty, so that a resumed sweep tries again."""
+    """The entry of a run that no worker finished; its key is empty, so that a resumed sweep tries again."""
     return failed(0, "", first(case), len(case.objectives), result.reason)

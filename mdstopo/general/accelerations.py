@@ -168,7 +168,7 @@ def make_workspace(model):
 
 @part
 def gather(model, j, x, out):
-    """out (2 D,) = the entries of x (n,) of the two bodies of joint j."""
+    """Copy the entries of x (n,) that belong to the two bodies of joint j into out (2 D,)."""
     each = freedoms(model)
     a = first_freedom(model, model.joint[j, JOINT_FIRST])
     b = first_freedom(model, model.joint[j, JOINT_SECOND])
@@ -179,7 +179,7 @@ def gather(model, j, x, out):
 
 @part
 def gather_multipliers(model, j, lam, out):
-    """out (rows,) = multipliers of joint j from lam (n_row,); 0 for rows that are left out."""
+    """Copy the multipliers of joint j from lam (n_row,) into out (rows,); 0 for rows that are left out."""
     for r in range(most_rows(model)):
         i = model.row[j, r]
         out[r] = lam[i] if i >= 0 else 0.0
@@ -393,7 +393,7 @@ def apply_mass(model, workspace, x, out):
 
 @kernel
 def newton_correction(model, workspace, w_q, w_v, off, change, row):
-    """What Newton's iteration adds to accelerations whose stage is implicit: W x = M off, Phi_q x = Phi_q off.
+    """The change of accelerations in Newton's iteration for an implicit stage: W x = M off, Phi_q x = Phi_q off.
 
     Constant:
       model: the compiled scene.
@@ -496,7 +496,8 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
 
 @kernel
 def accelerations_vjp(model, workspace, k, c, turn, z, y, bar_q, bar_v):
-    """Cotangents of a state from those of its balance, which z and y hold.
+    """Pull cotangents of accelerations and multipliers back to those of coordinates and velocities; z and y are
+    their adjoint variables.
 
     bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y.
 
@@ -627,7 +628,7 @@ def pairs_vjp(model, workspace, moves, k, c, z, bar_q, bar_v):
 
 @kernel
 def place_joints(model, workspace, q, v, a, lam):
-    """Prepare the joints for `joints_vjp`, at one state.
+    """Compute what `joints_vjp` needs of the joints at one state.
 
     model: the compiled scene.
     workspace: the workspace, with the bodies turned (`forces.turn_bodies`); own, stiffness, by_q and by_v are set.
@@ -680,7 +681,7 @@ def joints_vjp(model, workspace, z, y, bar_q, bar_v):
 
 @kernel
 def accelerations_jvp(model, workspace, k, c, turn, dq, dv, force, row):
-    """What changes of a state do to the right side of the balance.
+    """Push changes of coordinates and velocities to changes of the right side of the equations of motion.
 
     force -= K dq + C dv (turning loads with their sign), row -= G_q dq + G_v dv.
 

@@ -39,7 +39,7 @@ from mdstopo.general.general_responses import (
 )
 from mdstopo.general.method_interface import point_of, step_back, weights_of
 from mdstopo.general.parameters import add_event, add_times, event_slope
-from mdstopo.general.permanent_sets import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
+from mdstopo.general.permanent_sets import add_response_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES
 from mdstopo.mechanics.kinematics.kinematics_interface import difference, retract
@@ -53,7 +53,7 @@ NO_DIRECTION, KINK_OFFSET, KINK_THRESHOLD = 1e-6, 4e-6, 0.02
 
 @kernel
 def free_only(model, x):
-    """Set the entries of driven coordinates in x (n,) to zero: no design changes where these are."""
+    """Set the entries of driven coordinates in x (n,) to zero: no design changes these coordinates."""
     for i in range(model.driven.shape[0]):
         x[model.driven[i]] = 0.0
 
@@ -101,9 +101,9 @@ def apply_saltation_transposed(model, history, state, lam_q, lam_v, bar_set, dro
 @kernel
 def sweep(
     tag, model, tables, member_state, history, count, w, c, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar, drops,
-    looked, square, workspace, virtual, out, work,
+    integrated, square, workspace, virtual, out, work,
 ):  # fmt: skip
-    """Pull cotangents of fraction c of step w's motion back to the start, and gather the gradient at every stage.
+    """Pull cotangents at fraction c of step w back to the start, and add up the gradient at every stage.
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
@@ -114,7 +114,7 @@ def sweep(
         where there are none.
       sets_bar (S, slots): explicit cotangents of the permanent sets at all stages.
       drops (E,): as `event_drops` returns them; no rows where no integral is meant.
-      looked, square: the response whose integral (or that of its square) is meant, -1 for none.
+      integrated, square: the response whose integral (or that of its square) is meant, -1 for none.
     In and out:
       lam_q, lam_v (n,): cotangents of coordinates and velocities; at the end those of the start.
       bar_set (slots,): cotangents of the permanent sets.
@@ -157,7 +157,7 @@ def sweep(
         fraction[0] = 1.0
         before = history.index[w, PARENT]
         if model.varied.shape[0] > 0:
-            add_times(model, history, member_state, count, before + 1, looked, square, lam_v, 0.0, out)
+            add_times(model, history, member_state, count, before + 1, integrated, square, lam_v, 0.0, out)
         if before >= 0:
             apply_saltation_transposed(model, history, before + 1, lam_q, lam_v, bar_set, drops, member_state, out)
         w = before
@@ -245,7 +245,7 @@ def row_cotangents(
     weight = energy_weight(model, j, slopes)
     if bar_set.shape[0] > 0:
         bar_set[:] = 0.0
-        add_looked_sets(model, member_state, segment, j, who, slopes, t, q, v, a, bars, 1.0, bar_set)
+        add_response_sets(model, member_state, segment, j, who, slopes, t, q, v, a, bars, 1.0, bar_set)
     z = bars[2]
     factor_matrix(
         model,
@@ -354,7 +354,7 @@ def integral_gradient(
 
 @kernel
 def event_drops(model, member_state, history, count, j, square, workspace):
-    """(E,): g_j (or its square) before each event, less that after it: the slope of an integral by the event's time.
+    """(E,) by how much g_j (or its square) falls at each event: the slope of an integral by the event's time.
 
     Constant:
       model: the compiled scene.
@@ -418,7 +418,7 @@ def at_stage(model, member_state, segment, history, at, j, who, workspace, own, 
 
 @kernel
 def sides_inside(model, member_state, segment, history, o, stages, j, workspace):
-    """On which sides the switches of expression j are inside a step.
+    """The bits that say on which sides the switches of expression j are inside a step.
 
     Constant:
       model: the compiled scene.
@@ -482,7 +482,7 @@ def sign_at_stage(model, segment, j, who, member_state, history, at):
 def one_sided_limit(
     model, member_state, segment, history, at, inside, j, who, value, mine, size, slopes, rows, workspace, own, own_rows
 ):
-    """g_j and its slopes at a stage as they go on from inside the step, which ends where g_j has a kink.
+    """g_j and its slopes at the end of a step, as limits from inside the step, where g_j has a kink at that end.
 
     An absolute value or a norm that all but vanishes at the stage may have turned round there, and the largest force
     may be another's, by what the stage is off by; then the integrand is followed as the smooth function that it is
@@ -680,7 +680,7 @@ def integral_cotangents(
                     sign = -sign
                 explicit_part(model, segment, j, who, of_parts, t, member_state, q, v, a, factor * sign, out)
                 if sets_bar.shape[1] > 0:
-                    add_looked_sets(
+                    add_response_sets(
                         model, member_state, segment, j, who, of_parts, t, q, v, a, own, factor, sets_bar[o + i]
                     )  # fmt: skip
     return total

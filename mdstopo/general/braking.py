@@ -96,7 +96,7 @@ def friction_error(model, member_state, vectors, s, h, q0, v0, q1, v1, a, noise,
 
 @part
 def slowest_between(before, after):
-    """The least size of a sliding velocity (three numbers) that changes evenly from one to another (m/s)."""
+    """The smallest speed (m/s) on the straight line between two sliding velocities (three numbers each)."""
     forward = dot(before, after)
     if forward >= dot(before, before):
         return norm(before)
@@ -107,7 +107,8 @@ def slowest_between(before, after):
 
 @kernel
 def brake_rate(model, member_state, q, v, enough, workspace):
-    """The fastest rate at which closed contacts brake velocities at a state, at most; and which of them brakes most.
+    """An upper bound of the rate (1/s) at which friction in closed contacts brakes bodies at a state, and the
+    contact that brakes most.
 
     Friction has the slope D = mu N sech^2(slide / slip) / slip in the velocity, in space T / slide across that, damping
     has c; with rows B and the mobility

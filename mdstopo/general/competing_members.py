@@ -36,7 +36,7 @@ def compete(kind: int, reduction: ReductionKind) -> bool:
 def members_peaks(
     driver: "GeneralDriver", j: int, t: FloatArray, final: bool, window: float, most: int
 ) -> list[FloatArray]:
-    """The peaks of the members' forces that response j is of, as rows of `extremes`.
+    """The peaks over time of the members' forces from which response j is the largest, as rows of `extremes`.
 
     driver: with a finished run. j: the response.
     t (m + 1,): the steps' times (s).
@@ -141,7 +141,7 @@ def compare(
 
 
 def members_of(driver: "GeneralDriver", j: int) -> int:
-    """How many members the group has that response j is of."""
+    """How many members the group has whose forces response j is."""
     block = driver.scene.model.block
     own = block[block[:, GROUP] == driver.scene.model.response[j, SUBJECT]]
     return int((own[:, OFFSET] + own[:, COUNT]).max())

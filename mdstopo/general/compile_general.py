@@ -66,17 +66,18 @@ class GeneralScene:
 
     @cached_property
     def n(self) -> int:
-        """Freedoms of the bodies."""
+        """The number of freedoms of all bodies."""
         return self.kinematics.freedoms * self.n_bodies
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Coordinates that are free, less the independent rows of joints."""
+        """The number of free coordinates, less that of the independent rows of joints."""
         return int(self.model.free.sum()) - int(self.model.size[0])
 
 
-def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[ReductionKind, ...]]:
-    """Responses and reductions of a load case: its objectives, then its constraints, each in the case's order."""
+def evaluated_in(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[ReductionKind, ...]]:
+    """The responses that are evaluated in a load case, and how each is reduced: of objectives, then of constraints,
+    each in the case's order."""
     found = [(o.response, o.over_time) for o in case.objectives if o.load_case == load_case]
     rows = [row for row in case.constraints if isinstance(row, ResponseRow) and row.load_case == load_case]
     found += [(row.response, row.over_time) for row in rows]
@@ -84,7 +85,7 @@ def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[R
 
 
 def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
-    """The arrays of one load case."""
+    """The arrays of one load case, for the kernels of general scenes."""
     case = as_computed(case)
     include_kernels(case)
     dimension = dimension_of(case)
@@ -118,7 +119,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         reach[p] = max(reach[p], far)
     loads = dimension.loads(load_case, index, times, frames)
     timed = timed_loads(parts_of(load_case, lambda load: dimension.timed(load, frames), index), times)
-    responses, reductions = looked_at(case, load_case.name)
+    responses, reductions = evaluated_in(case, load_case.name)
     response, response_par, curves = _responses(case, dimension, frames, responses, index, members["curves"])
     members["curves"] = curves
     steady = [dimension.joint_kernels(type(each)).steady for each in case.joints]

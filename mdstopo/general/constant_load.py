@@ -42,7 +42,8 @@ def hold(
     out,
     work,
 ):
-    """The linear system of constant dynamic loading at a row of `extremes`; or, once it is solved, the gradient.
+    """Set up the linear system of constant dynamic loading at a row of `extremes`; or, given its solution, compute
+    the gradient.
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.

@@ -17,7 +17,7 @@ from mdstopo.general.general_responses import (
     is_plain,
     rated,
 )
-from mdstopo.general.method_interface import beside, derivatives, is_continuous, is_explicit, point_of
+from mdstopo.general.method_interface import derivatives, is_continuous, is_explicit, point_of, state_at_offset
 from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.structures import bundle
@@ -64,7 +64,8 @@ def finished(model, tables, member_state, history, count, work):
 
 @kernel
 def known_at(tag, history, count, k, e):
-    """The stage that has the balance at the start (e = 0) or the end (e = 1) of step k, on its own side; or -1.
+    """The number of the stage whose accelerations are those at the start (e = 0) or the end (e = 1) of step k; -1
+    where none is.
 
     The first stage of an explicit step is its start; what is in front of a boundary is what is behind it where no law,
     load or mode changes there.
@@ -218,7 +219,7 @@ def sample_response(
 def compare(
     tag, ints, floats, tables, limits, count, room, room_ints, member_state, exact, j, places, who, top, seen, work
 ):
-    """Forces of the members of a group beside each other, at any places of a finished motion.
+    """Forces of the members of a group, at any places of a finished motion.
 
     Constant:
       tag: the method of integration (`method_interface`).
@@ -285,7 +286,7 @@ def compare(
         work[OF_SAMPLES] += 2
         for side in (-1.0, 1.0):
             e = side * apart
-            beside(tag, model, history, k, c, e, q, v, a, near_q, near[0])
+            state_at_offset(tag, model, history, k, c, e, q, v, a, near_q, near[0])
             solve_accelerations(model, member_state, segment, t + e, near_q, near[0], no, workspace, near[1], lam)
             group_forces(model, member_state, segment, t + e, group, near_q, near[0], near[1], force)
             for m in range(who.shape[0]):
@@ -294,7 +295,7 @@ def compare(
 
 @kernel
 def time_at(history, k, c):
-    """The time at fraction c of step k."""
+    """The time (s) at fraction c of step k."""
     if c >= 1.0:
         return history.t[k + 1]
     return history.t[k] + c * (history.t[k + 1] - history.t[k])
@@ -302,7 +303,7 @@ def time_at(history, k, c):
 
 @kernel
 def go_to(tag, motion, k, c, exact, last):
-    """Put the state at a fraction of a step into `motion.q` and `motion.v`, with the modes of that step.
+    """Put the state at a fraction of a step into `motion.q` and `motion.v`, and members into the modes of that step.
 
     tag: the method of integration (`method_interface`).
     motion: the finished motion; its workspace, lam and the ends of the quintic are overwritten.
@@ -337,7 +338,7 @@ def go_to(tag, motion, k, c, exact, last):
 
 @kernel
 def held_back(model, workspace, d, a, lam):
-    """What inerters and joints take at coordinate d: (sum s b B^T B a + Phi_q^T lam)_d."""
+    """The force at coordinate d that inerters and joints take up: (sum s b B^T B a + Phi_q^T lam)_d."""
     total = 0.0
     for p in range(model.pair.shape[0]):
         for i in range(pair_freedoms(model)):

@@ -32,7 +32,7 @@ class JointRecord(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Dimension:
-    """How a case of one dimension becomes arrays.
+    """What differs between a plane and space where a case becomes arrays.
 
     kinematics: how its bodies move. point: numbers of a point. axes: the words of a body's motions, in the order of its
     freedoms. components: what a component of a response is called -> its code. response_par: numbers of a response.
@@ -78,7 +78,7 @@ class Dimension:
 
 
 def in_frame(frames: Frames, body: str, points: FloatArray) -> FloatArray:
-    """Points (..., d) of a body in the axes that arrays have."""
+    """Points (..., d) of a body in the axes that the kernels use for it."""
     if body not in frames:
         return points
     turned: FloatArray = points @ frames[body]
@@ -86,7 +86,7 @@ def in_frame(frames: Frames, body: str, points: FloatArray) -> FloatArray:
 
 
 def dimension_of(case: Case) -> Dimension:
-    """The record of a case."""
+    """What differs between a plane and space, for the dimension of a case."""
     if case.dimension > 2:
         from mdstopo.general.spatial_scene import SPACE
 

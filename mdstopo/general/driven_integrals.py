@@ -41,7 +41,7 @@ MOST_CUTS = 1000
 
 
 class Integrals(NamedTuple):
-    """Of a formula f over a stretch of time of the length h: that of f, and that of f times the time until its end."""
+    """Integrals of a formula f over a time h: of f, and of f times the time that is left until the end."""
 
     once: float
     twice: float
@@ -51,7 +51,7 @@ class Integrals(NamedTuple):
         return Integrals(self.once + other.once, self.twice + length * self.once + other.twice)
 
     def or_larger(self, other: Integrals) -> Integrals:
-        """The larger of each, other's by its magnitude."""
+        """The larger of each integral and another one's by its magnitude."""
         return Integrals(max(self.once, abs(other.once)), max(self.twice, abs(other.twice)))
 
 
@@ -68,7 +68,7 @@ class CalledFormula:
         return self.row[SCALE] * value + self.row[OFFSET], self.row[SCALE] * rate
 
     def over(self, start: float, length: float, mode: int) -> Integrals:
-        """The integrals over a stretch of time from `start` on (s), so long; mode: bits of its switches."""
+        """The integrals over the time `length` from `start` on (s); mode: bits of its switches."""
         once = twice = 0.0
         for node, weight in zip(NODES, WEIGHTS, strict=True):
             value, _ = self.at(start + node * length, mode)
@@ -78,7 +78,7 @@ class CalledFormula:
 
 
 def row_of_motion(formula: TimeFormula, kind: str) -> FloatArray:
-    """(WIDTH,): a formula that prescribes a coordinate, its velocity or its acceleration."""
+    """(WIDTH,) the numbers of a formula that prescribes a coordinate, its velocity or its acceleration."""
     row = row_of_formula(formula)
     row[DERIVED] = float(DERIVATIVES[kind])
     return row

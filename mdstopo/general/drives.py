@@ -22,7 +22,8 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 
 class Drives(NamedTuple):
-    """What is driven (`GeneralModel.driven`, `drive`, `drive_frame`, `drive_turn`, `driven_par`, `driven_mode`)."""
+    """The prescribed coordinates of a scene, as arrays (`GeneralModel.driven`, `drive`, `drive_frame`, `drive_turn`,
+    `driven_par`, `driven_mode`)."""
 
     driven: IndexArray
     cubics: FloatArray
@@ -60,7 +61,7 @@ def drives(
     v0: FloatArray,
     attitudes: FloatArray | None = None,
 ) -> Drives:
-    """What is driven, by motion, then by freedom.
+    """The arrays of all prescribed coordinates, by motion, then by freedom.
 
     load_case, dimension: the scene, and what belongs to its dimension.
     times (n_seg + 1,): ends of the segments (s).

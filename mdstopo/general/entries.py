@@ -11,7 +11,7 @@ from mdstopo.general import dense_output, direct, integral_gradients, peak_gradi
 
 
 class Entries(NamedTuple):
-    """What the driver calls; TAG: of the method."""
+    """The compiled functions that a driver calls, and the tag of the method of integration."""
 
     TAG: tuple[int, ...]
     simulate: Any
@@ -28,6 +28,6 @@ class Entries(NamedTuple):
 
 
 def entries_of(kind: IntegratorKind) -> Entries:
-    """The entries of a method."""
+    """The compiled entries of a method of integration."""
     own: Any = import_module(kind.general)
     return Entries(own.TAG, own.simulate)

@@ -196,7 +196,7 @@ def damp_error(model, table, s, h, workspace, a):
 
 @kernel
 def step_error(tag, vectors, s, h, longest, a, weight):
-    """From the damped error; see `method_interface.step_error`."""
+    """The estimated error of a step, from the damped one; see `method_interface.step_error`."""
     later = lasting(h, longest)
     worst = 0.0
     for d in range(weight.shape[0]):
@@ -209,13 +209,13 @@ def step_error(tag, vectors, s, h, longest, a, weight):
 
 @kernel
 def scheme(tag, method):
-    """One scheme for all scenes; see `method_interface.scheme`."""
+    """The one scheme of the method; see `method_interface.scheme`."""
     return STAGES, ORDER, FIRST_ERROR
 
 
 @kernel
 def is_explicit(tag):
-    """A stage's forces depend on its own accelerations."""
+    """Whether stages follow from those before them: no, a stage's forces depend on its own accelerations."""
     return False
 
 

@@ -57,7 +57,7 @@ FAR = 0.25
 
 @kernel
 def has_switches(model, knots):
-    """Whether any member can switch at all; knots: as of `members.set_modes`."""
+    """Whether any member can change its mode; knots: as of `members.set_modes`."""
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
         if code != INERTER and law_switches(code, model.law[k], model.curves) and (knots or not law_has_pieces(code)):
@@ -67,7 +67,7 @@ def has_switches(model, knots):
 
 @kernel
 def room_for_watched(model):
-    """Room for a list of members and contacts: how many they are, then their numbers (`watch_all`, `watch_near`)."""
+    """An array for a list of members and contacts: their number, then their places (`watch_all`, `watch_near`)."""
     return np.zeros(1 + model.member.shape[1] + model.contact_pair.shape[0], np.int64)
 
 
@@ -91,7 +91,8 @@ def watch_all(model, segment, watched):
 
 @kernel
 def watch_near(model, segment, t, member_state, rel0, rel1, h, watched):
-    """Write into `watched` those that may leave their mode within a step; the others have far to go.
+    """Write into `watched` those members and contacts that may leave their mode within a step; the others are too
+    far from its end.
 
     The margin of a member is followed on the cubic by its values and rates at both ends, which stays above the least of
     the cubic's four control values; FAR of what it changes by lies between that and zero. A margin that has rates in it
@@ -178,7 +179,8 @@ def smallest_margin(model, t, member_state, rel, watched):
 
 @kernel
 def first_dip(model, t, member_state, rel0, rel1, h, parts, watched):
-    """Where in a step a margin dips below zero between two poses at which it is not negative: members that come and go.
+    """The first place in a step at which a margin is below zero between two poses where it is not: a member leaves
+    its mode and comes back.
 
     Looked for on the cubic through a margin's values and rates at both poses.
 
@@ -264,7 +266,8 @@ def lowest_between(s0, d0, s1, d1):
 
 @kernel
 def probes_needed(model, rel0, rel1, watched):
-    """In how many parts a step is searched: more where the bodies move far compared with a member's length.
+    """In how many parts a step is searched for events: in more where bodies move far compared with a member's
+    length.
 
     The distance from a curved surface's centre or axis is to a contact what its length is to a member.
     """
@@ -357,7 +360,7 @@ def is_doubtful(model, t, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, wa
 
 @kernel
 def switch_any(model, segment, t, member_state, rel, q, v, a, who, slopes):
-    """What becomes of a member or contact whose margin is used up.
+    """Switch a member or contact whose margin is used up, and note what that does to derivatives.
 
     Constant:
       model: the compiled scene.
@@ -441,7 +444,7 @@ def switch_of(model, segment, t, member_state, q, v, a, i, k, slopes):
 
 @kernel
 def block_of(model, i):
-    """The block of padded member i."""
+    """The block of members that contains padded member i."""
     for k in range(model.block.shape[0]):
         if model.block[k, START] <= i and i < model.block[k, STOP]:
             return k

@@ -9,7 +9,7 @@ from mdstopo.general.general_responses import LISTED, code_of
 
 
 def expression_codes(response: Response, first: int) -> list[int]:
-    """The columns of an expression; first: place of the first of the responses that it is of."""
+    """The integers that describe an expression to kernels; first: place of the first of the responses that it is of."""
     kinds = [kind_of(each) for each in response.parts]
     kernels = [LISTED[code_of(kind)] for kind in kinds]
     made = program_of(response)
@@ -27,7 +27,8 @@ def expression_codes(response: Response, first: int) -> list[int]:
 
 
 def expression_data(response: Response) -> list[float]:
-    """Where its formulas are, groups of slopes, how many parameters, and the parameters."""
+    """The numbers that describe an expression to kernels: where its formulas are, groups of slopes, and its
+    parameters."""
     made = program_of(response)
     numbers = [value for _, value in response.parameters]
     return [float(address_of(made.groups)), float(made.parts), float(len(numbers)), *numbers]

@@ -29,7 +29,7 @@ MARGINS = 2**40
 
 @kernel
 def knows(model, j, what):
-    """Whether one of the bits above is set of an expression."""
+    """Whether an expression has one of the properties that the bits above stand for."""
     return model.response[j, KNOWN] & what != 0
 
 
@@ -56,7 +56,7 @@ def put_parameters(model, j, p):
 
 @kernel
 def margin_group(model, j, switch):
-    """The group of the margin of a switch, which its slopes follow."""
+    """The group of formulas that has the margin of a switch and then its slopes."""
     groups = int(model.curves[_at(model, j) + GROUPS])
     return SLOPES + groups + switch * (1 + groups)
 
@@ -116,7 +116,7 @@ def formula_mode(model, j, p, t):
     for switch in range(model.response[j, SWITCHES]):
         bit = np.int64(1) << np.int64(switch)
         group = np.int64(margin_group(model, j, switch))
-        _, _, looked, _, _ = call_formula(address, p, 0.0, 0.0, t, 0.0, mode, group)
-        if looked < 0.5 and mode & bit != 0:
+        _, _, evaluated, _, _ = call_formula(address, p, 0.0, 0.0, t, 0.0, mode, group)
+        if evaluated < 0.5 and mode & bit != 0:
             seen -= bit
     return seen

@@ -51,7 +51,7 @@ def unstretched_force(model, k):
 
 @kernel
 def rounding_at_start(model, member_state, rel, v, stiffness, strain, noise):
-    """What rounding leaves uncertain of how far each pair has moved.
+    """By how much the displacement of each pair is uncertain at the start because of rounding.
 
     That of the worst pair by `rounding_of_pairs` holds for all, since joints hand forces on and springs that hold
     against them may be elsewhere; but it is no more than rounding of the pair's size, and just that where a body is
@@ -96,7 +96,7 @@ def rounding_at_start(model, member_state, rel, v, stiffness, strain, noise):
 
 @kernel
 def motion_scale(model, q, rel, rel0, motion, noise, tolerance, scale):
-    """What the errors of each pair's motion are measured against.
+    """The size of each pair's motion, to which errors are relative.
 
     Constant:
       model: the compiled scene.

@@ -120,7 +120,7 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
 
 @kernel
 def members_alone(model, member_state, segment, t, q, v, workspace):
-    """The sums over the members at one state, and nothing else: what `general_forces` leaves of them.
+    """The sums over members of `general_forces` at one state, without loads, bushings and contacts.
 
     Constant:
       model: the compiled scene.

@@ -22,7 +22,8 @@ Place = tuple[str, int]
 
 
 def spring_of(law: Law) -> tuple[SpringLaw | CubicLaw, dict[str, str]] | None:
-    """The spring that a law by formula is, and what each parameter of the formula is there; None of other laws.
+    """The built-in spring that a law by formula equals, and what each parameter of the formula is of it; None where
+    it equals none.
 
     Force and energy have to be k x + c xd + p and k x^2 / 2, or k x + b x^3 and k x^2 / 2 + b x^4 / 4, where each of k,
     c, p and b is a number or another parameter.
@@ -133,7 +134,8 @@ def _product(one: Polynomial, other: Polynomial) -> Polynomial:
 
 
 def with_springs(case: Case) -> Case:
-    """The case in which laws by formula that are springs are springs, and their variables are those of springs."""
+    """The case with built-in springs in the place of laws by formula that equal them, and their variables changed
+    accordingly."""
     found = {
         (group.name, place): made
         for group in case.members

@@ -46,7 +46,8 @@ from mdstopo.mechanics.laws.law_table import SPRING, law
 
 @kernel
 def add_design(model, segment, t, member_state, q, v, a, z, weight, out, work):
-    """What all design members do to the gradient at one state: out -= f_i (b_i . T z) at unit strength, += weight V_i.
+    """Add what all design members have of the gradient at one state: out -= f_i (b_i . T z) at unit strength, +=
+    weight V_i.
 
     Behind the members out has the derivatives by parameters (P,), here and everywhere (`parameters`).
 
@@ -167,7 +168,7 @@ def _virtual(model, rel, p, z, out):
 
 @kernel
 def explicit_part(model, segment, j, who, slopes, t, member_state, q, v, a, scale, out):
-    """What the design does to g_j at fixed motion, where g_j is the force f* of a member, or of such forces.
+    """Add the derivative by the design at fixed motion of g_j that is a force f* of members.
 
     f* has a sign; the response is its absolute value (`force_sign`).
 

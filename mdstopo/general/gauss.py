@@ -77,17 +77,18 @@ PASSES = 12
 
 @kernel
 def margin_of(model):
-    """By how much an error of the motion has to be below that of the responses: 1 where all are energies."""
-    looked = model.response.shape[0]
-    for j in range(looked):
+    """By which factor errors of the motion have to be smaller than the tolerance of responses: 1 where all are
+    energies."""
+    count = model.response.shape[0]
+    for j in range(count):
         if model.response[j, KIND] != ENERGY:
             return MARGIN
-    return 1.0 if looked > 0 else MARGIN
+    return 1.0 if count > 0 else MARGIN
 
 
 @kernel
 def widest_turn(model, x):
-    """The largest angle by which numbers of moving bodies (W,), of a shift or of rates, turn one."""
+    """The largest angle that numbers of moving bodies (W,), a shift or rates, contain."""
     each = freedoms(model)
     turns = rotations(model)
     most = 0.0
@@ -107,7 +108,7 @@ def _may_turn(model, angle, most):
 
 @kernel
 def weigh_turns(model, weights, row):
-    """row (W,) = weights (n,) of moving bodies; turns of a body that is tied to nothing count per rad."""
+    """row (W,) = weights (n,) of moving bodies; rotations of a body that is tied to nothing are measured in rad."""
     each = freedoms(model)
     for d in range(moving(model)):
         turning = d % each >= each - rotations(model)
@@ -156,7 +157,7 @@ def _more_nodes(planes, s, old, h, nodes):
 
 @kernel
 def begin_nodes(model, v0, nodes):
-    """Put node 0 to the start of a window, and the row `start`; v0 (n,): velocities there."""
+    """Set node 0 to the start of a window with velocities v0 (n,), and the row `start`."""
     for d in range(moving(model)):
         nodes.start[d] = v0[d]
         nodes.x[0, d] = 0.0
@@ -181,7 +182,7 @@ def is_steady(model, segment):
 
 @kernel
 def predict(model, planes, h, o, history, nodes):
-    """Put u and x of a window to what its start's forces alone would do, and the linear balance to that of its start.
+    """First guess of a window: the motion under the forces at its start alone, with linear forces as they are there.
 
     Constant:
       model: the compiled scene.
@@ -237,7 +238,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
 
 @kernel
 def windows(model, tables, member_state, settings, most, history, work, where):
-    """Integrate window after window from the start to the end: `simulate` with everything unpacked.
+    """Integrate window after window from the start to the end: `simulate` with unpacked arguments.
 
     Constant:
       model: the compiled scene.

@@ -57,7 +57,7 @@ def stages_of(history, w):
 
 @part
 def level_of(s):
-    """The place of s among `COUNTS`."""
+    """The place of a window's number of nodes s in `COUNTS`."""
     level = 0
     while COUNTS[level] != s:
         level += 1
@@ -66,7 +66,7 @@ def level_of(s):
 
 @kernel
 def state_at(model, history, w, c, x, y, q, v):
-    """The polynomial of window w at a fraction of it.
+    """Coordinates and velocities at a fraction of window w, by its polynomial.
 
     Constant:
       model: the compiled scene.
@@ -93,7 +93,7 @@ def state_at(model, history, w, c, x, y, q, v):
 
 @kernel
 def point_of(tag, model, tables, member_state, history, count, k, c, keep, workspace, q, v, work):
-    """The polynomial of window k at a fraction c of it; returns k.
+    """Coordinates and velocities at fraction c of window k, by its polynomial; returns k.
 
     Constant:
       model: the compiled scene.
@@ -109,8 +109,8 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
 
 
 @kernel
-def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
-    """The polynomial of window k, a little later than at fraction c.
+def state_at_offset(tag, model, history, k, c, e, q, v, a, q_out, v_out):
+    """Coordinates and velocities of window k, a little later than at fraction c, by its polynomial.
 
     Constant:
       model: the compiled scene.
@@ -127,25 +127,26 @@ def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
 
 @kernel
 def derivatives(tag):
-    """Velocities only: between nodes the second derivative of the polynomial is not quite that of the balance."""
+    """How many derivatives of the motion are exact: velocities only; the polynomial's second derivative is not quite
+    the acceleration between nodes."""
     return 1
 
 
 @kernel
 def is_continuous(tag):
-    """The polynomial is as accurate as the window, and windows are longer than a quintic can follow."""
+    """Whether the state inside a window costs no forces: the polynomial is as accurate as the window."""
     return True
 
 
 @kernel
 def is_explicit(tag):
-    """Windows are implicit."""
+    """Whether stages follow from those before them: windows of collocation are implicit."""
     return False
 
 
 @kernel
 def weights_of(tag, model, tables, history, w, out):
-    """Gauss's weights, times the length of the window.
+    """Weights of the stages in an integral: Gauss's weights, times the length of the window.
 
     Constant:
       tables (n_level, 7, s_max, s_max): of `gauss_tables`.
@@ -509,7 +510,7 @@ implement(
     point_of=point_of,
     step_back=step_back,
     step_forward=step_forward,
-    beside=beside,
+    state_at_offset=state_at_offset,
     derivatives=derivatives,
     is_continuous=is_continuous,
     is_explicit=is_explicit,

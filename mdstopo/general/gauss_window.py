@@ -79,7 +79,7 @@ FIELDS = (
 
 
 class Nodes:
-    """The room of a window inside kernels, whose arrays `FIELDS` names; made by `make_nodes`."""
+    """The arrays of a window inside kernels, which `FIELDS` names; made by `make_nodes`."""
 
     def __init__(self, *_arrays: Any) -> None: ...
 
@@ -89,13 +89,13 @@ bundle(Nodes, FIELDS)
 
 @part
 def moving(model):
-    """Freedoms of the bodies that are no ground, which is the last one."""
+    """The number of freedoms of all bodies but ground, which is the last one."""
     return model.mass.shape[0] - freedoms(model)
 
 
 @kernel
 def make_nodes(model):
-    """Room for the windows of a motion."""
+    """Arrays for the nodes of a window."""
     n = model.mass.shape[0]
     m = moving(model)
     width = row_width(m)
@@ -131,7 +131,7 @@ def is_coupled(model, workspace):
 
 @kernel
 def balance_nodes(model, member_state, segment, s, energies, q0, rel0, workspace, history, o, nodes, work):
-    """Balance the first nodes at their x and y, G and its slopes as they are there, in one pass over the springs.
+    """Compute accelerations G and their slopes at the first nodes, from their x and y, in one pass over the springs.
 
     Constant:
       model: the compiled scene.
@@ -268,7 +268,7 @@ def _subtract_block(inverse, k, first, second, row, column, each, out):
 
 @kernel
 def add_changes(model, workspace, history, o, maps, inverse, dx, dy, change, row, u):
-    """u (W,) += G_x dx + G_y dy at a node, by pairs.
+    """Add the changes of G at a node to u (W,): u += G_x dx + G_y dy, by pairs.
 
     In:
       model: the compiled scene.
@@ -297,7 +297,7 @@ def add_changes(model, workspace, history, o, maps, inverse, dx, dy, change, row
 
 @kernel
 def pull_changes(model, workspace, history, o, maps, inverse, x, change, bar_x, bar_y):
-    """bar_x, bar_y (W,) = G_x^T x, G_y^T x at a node, by pairs.
+    """The transpose of `add_changes`: bar_x, bar_y (W,) = G_x^T x, G_y^T x at a node, by pairs.
 
     In:
       model: the compiled scene.
@@ -330,7 +330,7 @@ def pull_changes(model, workspace, history, o, maps, inverse, x, change, bar_x, 
 
 @kernel
 def spread_balance(model, history, o, s, nodes):
-    """Let nodes 1 to s - 1 have G and its slopes from node 0: as of a prediction.
+    """Copy accelerations and slopes of node 0 to nodes 1 to s - 1: as a prediction has them.
 
     model: the compiled scene. history, o: the history of steps, and its stage of node 0. s: number of nodes.
     nodes: the room of the window.

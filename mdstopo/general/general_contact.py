@@ -36,7 +36,7 @@ def add_contacts(model, member_state, rel, q, v, tangent, f, k_out, c_out):
 
 @kernel
 def contact_switch(model, member_state, q, v, a, j, slopes):
-    """As `events.switch_of`, of a contact: its next mode, and how far its margin goes beyond zero.
+    """The next mode of a contact, and how far its margin goes beyond zero; as `events.switch_of` of members.
 
     Constant:
       model: the compiled scene.

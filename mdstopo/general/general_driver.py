@@ -72,7 +72,8 @@ NO_PIECES = np.empty((0, 4))
 
 
 class GeneralDriver:
-    """One general scene, one method, ready to run; `integrators.scene_driver.SceneDriver` tells how."""
+    """One general scene and one integrator, ready to run; `integrators.scene_driver.SceneDriver` says what it can
+    do."""
 
     def __init__(self, case: Case, scene: GeneralScene, options: DriverOptions) -> None:
         self.case = case
@@ -133,12 +134,12 @@ class GeneralDriver:
 
     @property
     def alpha(self) -> FloatArray:
-        """(N,) of the design that was last taken."""
+        """(N,) alpha of the design that was last taken."""
         return self._alpha
 
     @property
     def values(self) -> FloatArray:
-        """(P,) of the laws' variables in the design that was last taken."""
+        """(P,) values of variables in the design that was last taken."""
         return self._values
 
     @property
@@ -162,7 +163,7 @@ class GeneralDriver:
         return self.scene.kinematics.rotations == 1
 
     def allow(self, steps: int) -> None:
-        """A run may take so many steps; else it ends with STEP_LIMIT."""
+        """Limit the number of steps of a run; one that needs more ends with STEP_LIMIT."""
         self._allowed = self.limits[0] = steps
 
     def _make_room(self, steps: int, stages: int, events: int) -> None:
@@ -294,7 +295,8 @@ class GeneralDriver:
         return found
 
     def rotation_jump(self, count: int) -> str:
-        """Which of these has turned by half a turn, where its vector jumps, in a run of so many steps, and when."""
+        """A sentence on the rotation response that has turned by half a turn, where its vector jumps, and when; empty
+        where none has."""
         if not self._rotations:
             return ""
         t, q, _ = self.states()
@@ -521,16 +523,17 @@ class GeneralDriver:
         return np.zeros((0, 0)) if self.start is None else self.start.slopes()
 
     def settle(self, design: FloatArray) -> bool:
-        """Take a design (`take`) and put the start at rest where the case asks for it; False where that cannot be."""
+        """Take a design (`take`) and move the start to its equilibrium where the case asks for it; False where there is
+        none nearby."""
         self.take(design)
         return self.start is None or self.start.move()
 
     def compile_steps(self) -> None:
-        """Have the machine code on the disk that makes steps, without any steps."""
+        """Compile what makes steps, without making any."""
         self.entry.simulate.compile(*self._simulate_arguments(True))
 
     def compile_responses(self) -> None:
-        """Have the machine code on the disk that looks back at steps, without any steps.
+        """Compile what evaluates responses and gradients from steps, without any steps.
 
         A process that does so beside one that compiles the steps takes half of the work from it.
         """
@@ -560,7 +563,8 @@ class GeneralDriver:
     def run(
         self, alpha: FloatArray, tangent: bool, quadrature_breakpoints: Sequence[float] = ()
     ) -> tuple[int, int, float]:
-        """Simulate a design (as of `take`) into the driver's own room: code, number of steps, time reached.
+        """Simulate a design (as of `take`) into the driver's own arrays. Returns code, number of steps, time
+        reached.
 
         quadrature_breakpoints: times at which steps are to end, beside those of the model.
         """
@@ -613,13 +617,13 @@ class GeneralDriver:
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
         return self.start.settled if self.start is not None and self.settle(alpha) else None
 
-    def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
+    def differentiate(self, method: str, alpha: FloatArray, result: ResponseResult, cones: bool) -> Differentiated:
         """Gradients of what `evaluate` found, by a method that is no part of it; cones: tell `across`, too."""
         from mdstopo.general.methods import differentiate
 
         tell = cones and SENSITIVITIES[method].tells_norms and self._is_planar
-        across = np.zeros_like(looked.gradients) if tell else None
-        gradients, message = differentiate(self, method, alpha, looked, across)
+        across = np.zeros_like(result.gradients) if tell else None
+        gradients, message = differentiate(self, method, alpha, result, across)
         return Differentiated(Status.OK, message, gradients, across)
 
     def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
@@ -678,7 +682,7 @@ class GeneralDriver:
         self._packed = self.ints, self.floats = self.pack(self._model)
 
     def with_start(self) -> GeneralModel:
-        """The model with the start as it was assembled or has settled."""
+        """The model with the start state to which it was assembled or has settled."""
         q0, v0 = self.packed_start()
         return self._model._replace(q0=q0, v0=v0)
 
@@ -707,7 +711,8 @@ class GeneralDriver:
         return f"{when}; the fastest body is {fastest_body(self.scene.bodies, v)}"
 
     def states(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Times, coordinates and velocities in the driver's room, with the room for more behind them."""
+        """Times, coordinates and velocities of all steps, as views of the driver's arrays, with unused entries behind
+        them."""
         steps, model, room = int(self.limits[1]) + 1, self.scene.model, self.room
         at_v = steps + steps * len(model.q0)
         end = at_v + steps * len(model.v0)
@@ -766,7 +771,8 @@ class GeneralSteps:
         self.v: FloatArray = v[: count + 1].copy()
 
     def balanced(self, times: FloatArray) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """q (T, n_q), v, a (T, n) and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
+        """States and accelerations at times (T,): q (T, n_q), v, a (T, n) and lam (T, n_rows) of joints and motions;
+        right-continuous."""
         if self.count == 0:
             raise ValueError("no step was completed")
         step = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, self.count - 1)
@@ -777,7 +783,7 @@ class GeneralSteps:
         return (q, out[0], out[1]), self._all_rows(q, solved)
 
     def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """q (T, n_q), v and a (T, n) at times (T,) within what was simulated."""
+        """Coordinates q (T, n_q), velocities v and accelerations a (T, n) at times (T,) within what was simulated."""
         return self.balanced(np.asarray(times, dtype=np.float64))[0]
 
     def _all_rows(self, q: FloatArray, solved: FloatArray) -> FloatArray:

@@ -204,7 +204,7 @@ class GeneralModel(NamedTuple):
 
 
 def without_numbers() -> dict[str, Any]:
-    """The fields `apart`, `twins` and `twin_ints` of a scene that is differentiated by none."""
+    """Empty fields `apart`, `twins` and `twin_ints`, for a scene of which no numbers vary."""
     return {"apart": np.zeros(0), "twins": np.zeros((0, 2, 0)), "twin_ints": np.zeros(0, dtype=np.int64)}
 
 

@@ -33,7 +33,7 @@ HIGHEST, MANY = 3, 8
 
 
 class ScenePricingStates(NamedTuple):
-    """The states of one load case from which prices follow, of a weighted sum of rows.
+    """The pricing states of one load case: from them the price of any member in a weighted sum of rows follows.
 
     case, scene: as compiled. model: of the run, whose segments may be more than the scene's. pairs: the number of each
     pair among those that are kept. steps: where the law of a group switches. The others as of `states_of_sum`.
@@ -53,13 +53,13 @@ class ScenePricingStates(NamedTuple):
 
 
 class PricingStates(NamedTuple):
-    """The states from which the price of any member follows: of all load cases, and of all samples of a case."""
+    """The pricing states of all load cases and samples, from which the price of any member follows."""
 
     scenes: tuple[ScenePricingStates, ...]
 
     @classmethod
     def of_all(cls, parts: "Sequence[PricingStates]") -> "PricingStates":
-        """Those of several motions together."""
+        """The pricing states of several motions together."""
         return cls(tuple(scene for part in parts for scene in part.scenes))
 
 

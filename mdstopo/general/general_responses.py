@@ -56,7 +56,7 @@ from mdstopo.general.general_model import (
     GeneralModel,
 )
 from mdstopo.general.members import MODE, SCALE, SET, level_of
-from mdstopo.general.method_interface import beside, derivatives, is_continuous
+from mdstopo.general.method_interface import derivatives, is_continuous, state_at_offset
 from mdstopo.general.response_kernels import ResponseKernels, VectorKernels
 from mdstopo.general.step_history import SEGMENT
 from mdstopo.general.strides import (
@@ -160,7 +160,8 @@ def _is_by_state(kind):
 
 @kernel
 def is_plain(model, group):
-    """Whether rates of a group's forces are formulas: no inerters, no laws of time whose slope is not known."""
+    """Whether the rates of a group's forces are known as formulas: it has no inerters, and no forces over time of
+    unknown slope."""
     for k in range(model.block.shape[0]):
         if model.block[k, GROUP] == group and (model.block[k, CODE] == INERTER or law_lacks_rate(model.block[k, CODE])):
             return False
@@ -169,7 +170,7 @@ def is_plain(model, group):
 
 @kernel
 def follows_state(tag, model, j):
-    """Whether the rate of response j is g_q v + g_v a on the motion of a method, and a known slope by time."""
+    """Whether the rate of response j is g_q v + g_v a along the motion of a method, plus a known slope by time."""
     kind = model.response[j, KIND]
     if kind == MEMBER_FORCE:
         return derivatives(tag) > 1 and is_plain(model, model.response[j, SUBJECT])
@@ -391,7 +392,7 @@ def largest_force(model, member_state, segment, t, group, q, v, a):
 
 @kernel
 def members_of(model, group):
-    """How many members a group has."""
+    """How many members a group of the model has."""
     count = 0
     for k in range(model.block.shape[0]):
         if model.block[k, GROUP] == group:
@@ -536,7 +537,7 @@ def _expression_numbers(model, member_state, segment, j, t, q, v, a, lam, worksp
 
 @kernel
 def chosen_part(model, member_state, segment, j, who, t, q, v, a, lam, workspace):
-    """Of which member the force is meant, or on which side the switches of an expression are.
+    """The member whose force response j is at this state, or the bits of the switches of an expression.
 
     Constant:
       model: the compiled scene.
@@ -575,7 +576,7 @@ def has_switches(model, j):
 
 @kernel
 def has_energy(model, j):
-    """Whether response j is the stored energy, or an expression that has it."""
+    """Whether response j is the stored energy, or an expression in which it occurs."""
     kind = model.response[j, KIND]
     return kind == ENERGY or (kind == EXPRESSION and knows(model, j, ENERGETIC))
 
@@ -844,14 +845,14 @@ def is_norm(model, j):
 
 
 def has_norm(model: GeneralModel, j: int) -> bool:
-    """`is_norm` in Python."""
+    """Whether response j is the norm of a vector; `is_norm`, called from Python."""
     if is_expression(model, j):
         return False
     return LISTED[int(model.response[j, KIND])].vector is not None and int(model.response[j, COMPONENT]) == NORM
 
 
 def has_kinks(model: GeneralModel, j: int) -> bool:
-    """`kinked` in Python."""
+    """Whether response j may have kinks in time; `kinked`, called from Python."""
     return is_absolute(model, j) or has_norm(model, j)
 
 
@@ -888,7 +889,7 @@ def _across(kind, model, j, q, v, a, lam, bars, row_bar):
 
 @kernel
 def across_slopes(model, j, q, v, a, lam, bars, row_bar):
-    """In a plane: slopes of the component perpendicular to the vector whose norm response j is, its direction held.
+    """In a plane: slopes of the component perpendicular to the vector whose norm response j is, at fixed direction.
 
     Constant:
       model: the compiled scene.
@@ -1001,7 +1002,7 @@ def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, 
     apart = APART * (history.t[k + 1] - history.t[k])
     for side in range(2):
         e = apart if side == 1 else -apart
-        beside(tag, model, history, k, c, e, q, v, here, near_q, near[0])
+        state_at_offset(tag, model, history, k, c, e, q, v, here, near_q, near[0])
         solve_accelerations(model, member_state, segment, t + e, near_q, near[0], no, workspace, near[1], lam)
         _components(model.response[j, KIND], model, j, near_q, near[0], near[1], lam, nearby[side])
     x = nearby[1, 0] - nearby[0, 0]
@@ -1164,7 +1165,7 @@ def rated(
     sides = np.zeros(2)
     for side in range(2):
         e = apart if side == 1 else -apart
-        beside(tag, model, history, k, c, e, q, v, a, near_q, near[1])
+        state_at_offset(tag, model, history, k, c, e, q, v, a, near_q, near[1])
         solve_accelerations(model, member_state, segment, t + e, near_q, near[1], no, workspace, near[2], own)
         sides[side] = response(
             model, member_state, segment, j, who, t + e, near_q, near[1], near[2], own, workspace, bars, row_bar
@@ -1201,7 +1202,7 @@ CODES: dict[str, int] = {}
 
 
 def code_of(kind: ResponseKind) -> int:
-    """The code of a response."""
+    """The code by which kernels know a response."""
     if kind.kernels not in CODES:
         module, _, name = kind.kernels.partition(":")
         CODES[kind.kernels] = LISTED.add(getattr(importlib.import_module(module), name))

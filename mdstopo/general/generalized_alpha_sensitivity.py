@@ -36,33 +36,35 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
 
 
 @kernel
-def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
-    """The cubic of step k, a little later than at fraction c; see `method_interface.beside`."""
+def state_at_offset(tag, model, history, k, c, e, q, v, a, q_out, v_out):
+    """The cubic of step k, a little later than at fraction c; see `method_interface.state_at_offset`."""
     h = history.t[k + 1] - history.t[k]
     cubic(model, c + e / h, h, history.q[k], history.v[k], history.q[k + 1], history.v[k + 1], q_out, v_out)
 
 
 @kernel
 def derivatives(tag):
-    """Velocities only: the cubic's second derivative is not the acceleration."""
+    """How many derivatives of the motion are exact: velocities only; the cubic's second derivative is not the
+    acceleration."""
     return 1
 
 
 @kernel
 def is_continuous(tag):
-    """The quintic through the accelerations of both ends is closer to the motion than the method's cubic."""
+    """Whether samples are taken on the method's own cubic: no, the quintic through both accelerations is closer to the
+    motion."""
     return False
 
 
 @kernel
 def is_explicit(tag):
-    """Steps are implicit."""
+    """Whether stages follow from those before them: steps of generalized-alpha are implicit."""
     return False
 
 
 @kernel
 def weights_of(tag, model, tables, history, w, out):
-    """The trapezoidal rule; see `method_interface.weights_of`.
+    """Weights of the stages in an integral, by the trapezoidal rule; see `method_interface.weights_of`.
 
     For an end half of each step next to it, for a stage off the motion nothing.
     """
@@ -79,7 +81,7 @@ def weights_of(tag, model, tables, history, w, out):
 
 @kernel
 def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, workspace, work):
-    """Through the stages of step w, its end first; see `method_interface.step_back`.
+    """Pull cotangents of the end of step w back through its stages to its start; see `method_interface.step_back`.
 
     lam_x (R, 2, n) belongs to the acceleration and the auxiliary one; tables (1,): the spectral radius.
     """
@@ -204,7 +206,7 @@ def _stage_row_back(
 
 @kernel
 def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
-    """Through the stages of step w, its end last; see `method_interface.step_forward`.
+    """Push changes at the start of step w through its stages to its end; see `method_interface.step_forward`.
 
     dx (2, n) belongs to the acceleration and the auxiliary one; tables (1,): the spectral radius.
     """
@@ -272,7 +274,7 @@ implement(
     point_of=point_of,
     step_back=step_back,
     step_forward=step_forward,
-    beside=beside,
+    state_at_offset=state_at_offset,
     derivatives=derivatives,
     is_continuous=is_continuous,
     is_explicit=is_explicit,

@@ -27,7 +27,7 @@ VELOCITY, ACCELERATION, AUXILIARY = range(3)
 
 @kernel
 def rate_of(model, workspace):
-    """Angular frequency of the fastest vibration at the balanced state in the workspace, rad/s (an estimate)."""
+    """An estimate of the angular frequency of the fastest vibration at the state in the workspace, rad/s."""
     n = model.mass.shape[0]
     inverse = np.zeros(n)
     for d in range(n):

@@ -20,12 +20,12 @@ def value_of_integral(reduction: ReductionKind, total: float, span: float) -> tu
 
 
 def integral(total: float, span: float) -> tuple[float, float]:
-    """The integral itself."""
+    """The reduction that is the integral itself."""
     return total, 1.0
 
 
 def mean(total: float, span: float) -> tuple[float, float]:
-    """The integral divided by the time."""
+    """The reduction that is the integral divided by the time."""
     return total / span, 1.0 / span
 
 

@@ -27,7 +27,7 @@ SINGULAR = 1e-12
 
 @kernel
 def index(i):
-    """An index that is not negative: else every access has code for counting from the end."""
+    """A whole number that is known not to be negative: indexing with it compiles to shorter code."""
     return np.uint64(i)
 
 
@@ -111,7 +111,7 @@ def decompose(envelope, gram, diagonal):
 
 @part
 def in_pairs(envelope, i):
-    """Whether row i and the next one begin at the same place, as the rows of one joint do.
+    """Whether the stored parts of rows i and i + 1 begin at the same column, as those of one joint do.
 
     Then both are factorised at once, which is faster: the products of one do not wait for those of the other.
     """
@@ -189,7 +189,8 @@ def _decompose_two(envelope, gram, diagonal, i):
 
 @kernel
 def growth(envelope, gram, diagonal, x):
-    """A sum of squares that is large where the smallest eigenvalue is small, and the row that has most of it.
+    """A sum of squares that is large where the smallest eigenvalue is small, and the row that has the largest part
+    in it.
 
     envelope, gram and diagonal are the factors by `decompose`; x (n_row,) is scratch.
 

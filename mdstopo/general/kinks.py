@@ -34,7 +34,8 @@ DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
 
 
 def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
-    """Times inside (t[0], t[-1]) at which steps are to end for the sake of response j; t (m + 1,): the steps' times."""
+    """Times inside (t[0], t[-1]) at which steps have to end because response j has a kink there; t (m + 1,): the steps'
+    times."""
     pieces = Pieces(driver, j, t)
     values, rates = pieces.samples[:, :, 0], pieces.samples[:, :, 1]
     highest = float(np.abs(values).max())
@@ -62,7 +63,8 @@ def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
 
 
 def turns_round(model: GeneralModel, j: int) -> bool:
-    """Whether response j is the norm of a vector, or a root of an expression, which all but vanishes beside a zero."""
+    """Whether response j may change its direction sharply near zero: the norm of a vector, or a root in an
+    expression."""
     return has_norm(model, j) or is_expression(model, j)
 
 
@@ -92,7 +94,7 @@ def _around(time: float, low: float, rate: float, start: float, end: float) -> l
 
 
 def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
-    """The model with further ends of segments; what acts in time is the same function as before."""
+    """The model with further times at which segments end; loads and laws are the same functions of time as before."""
     old = model.times
     apart = 1e-10 * float(old[-1] - old[0])
     asked = np.sort(np.asarray(times, dtype=np.float64))

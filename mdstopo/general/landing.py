@@ -35,7 +35,7 @@ HIDDEN, PROBES = 8, 8
 
 
 class Landing:
-    """A step inside kernels, whose parts `FIELDS` names; made by `landing_of`."""
+    """A step that is searched for an event, inside kernels; `FIELDS` names its parts, `landing_of` makes it."""
 
     def __init__(self, *_parts: object) -> None: ...
 
@@ -45,7 +45,7 @@ bundle(Landing, FIELDS)
 
 @kernel
 def landing_of(model, table, size, member_state, q0, v0, q, v, a, workspace, watched):
-    """A `Landing`, with its room.
+    """A `Landing` with its arrays.
 
     model: the compiled scene.
     table (3, 17, 17): coefficients of the second method.
@@ -153,7 +153,7 @@ def first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
 
 @kernel
 def keep_used(step, t, rounding):
-    """Leave on the list of the members that are watched those alone whose margin is used up at time t, `step.rel`."""
+    """Keep on the list of watched members those alone whose margin is used up at time t, `step.rel`."""
     step.single[0] = 1
     found = 0
     for m in range(1, step.watched[0] + 1):
@@ -167,7 +167,8 @@ def keep_used(step, t, rounding):
 
 @kernel
 def root_inside(step, segment, t, h, low, high, at_high, rounding, resolution):
-    """Where the smallest margin of the members `step.crossed` is used up, beside the joints.
+    """The moment within a step at which the smallest margin of the members `step.crossed` is used up, without
+    projection onto the joints.
 
     step: the step (`Landing`), with the poses at `low` in `before`.
     segment: number of the stretch of time between two breakpoints.
@@ -226,7 +227,7 @@ def used_before(step, segment, t, h, low, c, at_c, who, rounding):
 
 @kernel
 def on_joints(step, segment, t, h, low, c, value, who, rate, rounding, resolution):
-    """Correct the moment of an event that has been found beside the joints: Newton's method between bounds.
+    """Correct the moment of an event for the projection onto the joints, by Newton's method between bounds.
 
     step: the step (`Landing`), whose members `crossed` are checked.
     segment: number of the stretch of time between two breakpoints.

@@ -40,7 +40,8 @@ TRIALS = 4
 
 
 class Lead(NamedTuple):
-    """A member leads from fraction `low` to `high` of a step, or the switches of an expression are as it says."""
+    """A part of a step, from fraction `low` to `high`, in which one member carries the largest force, or switches keep
+    their sides."""
 
     step: int
     low: float
@@ -49,7 +50,8 @@ class Lead(NamedTuple):
 
 
 def leads(driver: "GeneralDriver", j: int, t: FloatArray) -> list[Lead]:
-    """Who carries the largest force of response j, in order of time; t (m + 1,): the steps' times."""
+    """The members that carry the largest force of response j one after the other, in order of time; t (m + 1,): the
+    steps' times."""
     count, members = len(t) - 1, members_of(driver, j)
     found: list[Lead] = []
     if members == 1:
@@ -78,7 +80,7 @@ def changes(leads_of: list[Lead], t: FloatArray) -> list[float]:
 
 
 def is_led(driver: "GeneralDriver", j: int) -> bool:
-    """Whether response j is the largest force of several members."""
+    """Whether response j is the largest of the forces of several members."""
     return bool(driver.scene.model.response[j, KIND] == MEMBER_FORCE) and members_of(driver, j) > 1
 
 
@@ -165,7 +167,7 @@ def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who:
 
 
 def apart(cuts: list[float]) -> list[float]:
-    """Cuts, rising from 0, without those that leave next to nothing of the step before or behind them."""
+    """Cuts, rising from 0, without those next to each other or to the end of the step."""
     kept = cuts[:1]
     for cut in cuts[1:]:
         if cut - kept[-1] > EDGE and cut < 1.0 - EDGE:

@@ -48,7 +48,7 @@ LEAVE, APPROACH, NEAREST = 1.0, 0.5, 0.65
 
 @kernel
 def quintic_ends(model, member_state, segment, t, low, high, q0, v0, q1, v1, workspace, lam, ends_q, ends):
-    """What the quintic through both ends of a piece of a step is made of.
+    """The coefficients of the quintic through both ends of a piece of a step.
 
     Constant:
       model: the compiled scene.
@@ -148,7 +148,7 @@ def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, watc
 def foreseen_trial(
     model, member_state, segment, t, low, high, ends_q, ends, trials, tries, rounding, watched, room_q, room_v, rel
 ):
-    """Where the next trial is to be by what the quintic and the trials so far foresee, or -1: nowhere.
+    """Where to try next for a zero of the margin, from the quintic and the trials so far; -1: they tell nothing.
 
     Constant:
       model: the compiled scene.
@@ -189,7 +189,7 @@ def foreseen_trial(
 
 @kernel
 def note_trial(trials, middle, value):
-    """trials (2, 2): the last one, at a length `middle` (s) with a margin, before the one that was the last."""
+    """Keep the last two trials in trials (2, 2): each a length (s) and a margin."""
     for i in range(2):
         trials[1, i] = trials[0, i]
     trials[0, 0] = middle
@@ -225,7 +225,7 @@ def next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries
 
 @kernel
 def narrowed(low, high, at_low, at_high, middle, value, rounding, side):
-    """The bracket after another look: low, high, at_low, at_high, side, by Illinois' rule.
+    """The bracket of a zero after another trial: low, high, at_low, at_high, side, by Illinois' rule.
 
     low, high: lengths of the step between which the margin vanishes (s).
     at_low, at_high: the smallest margins there; the one that stays a second time running is halved.
@@ -252,7 +252,7 @@ def cut_at(dip, near, low, high):
 
 @kernel
 def matters(model, t, member_state, rel, i):
-    """Whether derivatives depend on it that member or contact i only just does not leave its mode.
+    """Whether derivatives would be others if member or contact i only just left its mode.
 
     t, rel (n_pair, POSE): that time (s), and relative poses then. Members with a permanent set are left out: where no
     energy is lost they come back to the very place at which the set was made, which is no touch to warn of.
@@ -270,7 +270,7 @@ def matters(model, t, member_state, rel, i):
 
 @kernel
 def is_sharp(model, t, member_state, rel, i):
-    """Whether slopes of the force of member or contact i begin with a root at the switch that is nearest to it.
+    """Whether the slopes of the force of member or contact i grow like a root behind its nearest switch.
 
     t, rel (n_pair, POSE): that time (s), and relative poses then.
     """
@@ -305,7 +305,8 @@ def time_to_switch(model, t, member_state, rel, i):
 
 @kernel
 def time_to_sharp(model, t, member_state, rel, watched):
-    """When the first of the watched members comes to a switch at which slopes begin with a root, s from now, and which.
+    """The time (s) until the first of the watched members comes to a switch behind which slopes grow like a root,
+    and which member.
 
     t, rel (n_pair, POSE): that time (s), and relative poses then. watched: the members (`events.watch_near`).
 
@@ -325,7 +326,7 @@ def time_to_sharp(model, t, member_state, rel, watched):
 
 @kernel
 def step_beside_sharp(away, since, near):
-    """How long a step may be beside switches at which slopes begin with a root: by the time from and to them (s).
+    """The longest step (s) near switches behind which slopes grow like a root, by the times from and to them.
 
     away: how long it is to the next such switch, infinite: none is foreseen. since: how long ago the last one was.
     near: how long the steps right beside them are (s).

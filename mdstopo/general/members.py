@@ -107,7 +107,7 @@ def general_sums(model, segment, t, member_state, rel, tangent, sums):
 
 @kernel
 def sums_at_poses(model, segment, when, member_state, rel, count, energies, sums):
-    """`general_sums` with tangents at several states of one segment: springs are read once for all.
+    """`general_sums` with tangents at several states of one segment: the springs' data are read once for all.
 
     Constant:
       model: the compiled scene.
@@ -169,8 +169,7 @@ def shortest_at_home(model, shortest):
 
 @kernel
 def set_modes(model, member_state, rel, rel_rate, knots):
-    """Set rows MODE and SET of member_state, modes and permanent sets of members and contacts, as they are at the
-    start.
+    """Set the modes and permanent sets of members and contacts in member_state as they are at the start.
 
     rel (n_pair, POSE): relative poses; rel_rate (n_pair, D): their second derivatives in time.
     knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise, and in groups of more

@@ -5,7 +5,7 @@ The tag is a tuple of zeros whose length says which method is meant. A method ha
 1. `point_of`: the state inside a step;
 2. `step_back`: a step of the reverse sweep;
 3. `step_forward`: changes pushed through a step;
-4. `beside`: the motion a little later; `derivatives`: how many of its derivatives are those of the balance;
+4. `state_at_offset`: the motion a little later; `derivatives`: how many of its derivatives are those of the balance;
    `is_continuous`: whether states inside a step are at hand; `is_explicit`: whether stages follow from those before
    them, and the first is the start of the step;
 5. `weights_of`: weights of a step's stages in an integral.
@@ -26,7 +26,7 @@ IMPLEMENTED: dict[str, dict[int, Any]] = {
     "point_of": {},
     "step_back": {},
     "step_forward": {},
-    "beside": {},
+    "state_at_offset": {},
     "derivatives": {},
     "is_continuous": {},
     "weights_of": {},
@@ -105,8 +105,8 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
     raise NotImplementedError
 
 
-def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
-    """The motion a little later than at fraction c of step k.
+def state_at_offset(tag, model, history, k, c, e, q, v, a, q_out, v_out):
+    """Coordinates and velocities a little later than at fraction c of step k.
 
     Constant:
       tag: the integrator.
@@ -121,12 +121,14 @@ def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
 
 
 def derivatives(tag):
-    """How many derivatives of the method's motion are those of the balance: 1, velocities; 2, accelerations too."""
+    """How many derivatives of the method's motion are those of the equations of motion: 1, velocities; 2, accelerations
+    too."""
     raise NotImplementedError
 
 
 def is_continuous(tag):
-    """Whether `point_of` costs no balance. Then samples are taken there; else on the quintic through a step's ends."""
+    """Whether `point_of` computes no forces. Then samples are taken there; else on the quintic through a step's
+    ends."""
     raise NotImplementedError
 
 
@@ -203,7 +205,7 @@ def is_explicit(tag):
 
 
 def implement(tag: tuple[int, ...], **functions: Callable[..., Any]) -> None:
-    """Enter a method's compiled functions."""
+    """Register the compiled functions of a method of integration under its tag."""
     for name, function in functions.items():
         IMPLEMENTED[name][len(tag)] = function
 
@@ -213,7 +215,7 @@ def _of(name: str, tag: Any) -> Any:
 
 
 for _stub in (
-    point_of, step_back, step_forward, beside, derivatives, is_continuous, weights_of, make_stages, step_error, scheme,
-    is_explicit,
+    point_of, step_back, step_forward, state_at_offset, derivatives, is_continuous, weights_of, make_stages, step_error,
+    scheme, is_explicit,
 ):  # fmt: skip
     by_type(_stub, "tag", partial(_of, _stub.__name__))

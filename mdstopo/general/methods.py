@@ -24,39 +24,39 @@ SWEEPS = 200
 
 
 def differentiate(
-    driver: "GeneralDriver", method: str, alpha: FloatArray, looked: ResponseResult, across: FloatArray | None = None
+    driver: "GeneralDriver", method: str, alpha: FloatArray, result: ResponseResult, across: FloatArray | None = None
 ) -> tuple[FloatArray, str]:
     """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by a method whose gradients do not come
     with the values; and what the user should know although it worked.
 
     across (n_resp, R, N): is filled, where the method tells that (`evaluation.Peak.across`).
     """
-    found: tuple[FloatArray, str] = resolve_name(SENSITIVITIES[method].general)(driver, alpha, looked, across)
+    found: tuple[FloatArray, str] = resolve_name(SENSITIVITIES[method].general)(driver, alpha, result, across)
     return found
 
 
 def by_direct(
-    driver: "GeneralDriver", alpha: FloatArray, looked: ResponseResult, across: FloatArray | None
+    driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None
 ) -> tuple[FloatArray, str]:
     """Gradients carried forward with the motion, as of `differentiate`."""
-    return _carried(driver, alpha, looked, across, 0)
+    return _carried(driver, alpha, result, across, 0)
 
 
 def by_iterative(
-    driver: "GeneralDriver", alpha: FloatArray, looked: ResponseResult, across: FloatArray | None
+    driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None
 ) -> tuple[FloatArray, str]:
     """The same by fixed-point sweeps over implicit steps; by `by_direct` where these do not contract."""
-    return _carried(driver, alpha, looked, across, SWEEPS)
+    return _carried(driver, alpha, result, across, SWEEPS)
 
 
 def by_constant_load(
-    driver: "GeneralDriver", alpha: FloatArray, looked: ResponseResult, across: FloatArray | None
+    driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None
 ) -> tuple[FloatArray, str]:
     """Gradients with inertia and loads frozen; `across` is left as it is."""
-    gradients, rows = np.zeros_like(looked.gradients), looked.rows.copy()
+    gradients, rows = np.zeros_like(result.gradients), result.rows.copy()
     count = _run_again(driver, alpha)
     for j, reduction in enumerate(driver.scene.reductions):
-        for r in range(int(looked.found[j])):
+        for r in range(int(result.found[j])):
             gradients[j, r] = _held(driver, j, rows[j, r], reduction, count)
     return gradients, ""
 
@@ -70,14 +70,14 @@ def _run_again(driver: "GeneralDriver", alpha: FloatArray) -> int:
 
 
 def _carried(
-    driver: "GeneralDriver", alpha: FloatArray, looked: ResponseResult, across: FloatArray | None, sweeps: int
+    driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None, sweeps: int
 ) -> tuple[FloatArray, str]:
     """As `by_direct`. sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most."""
-    gradients, message = np.zeros_like(looked.gradients), ""
-    rows = looked.rows.copy()
+    gradients, message = np.zeros_like(result.gradients), ""
+    rows = result.rows.copy()
     count = _run_again(driver, alpha)
     for j, reduction in enumerate(driver.scene.reductions):
-        for r in range(int(looked.found[j])):
+        for r in range(int(result.found[j])):
             aims = [(False, gradients[j, r])]
             if across is not None and driver.shapes[j] == "norm":
                 aims.append((True, across[j, r]))
@@ -90,7 +90,7 @@ def _carried(
                     )  # fmt: skip
                     if stopped >= 0:
                         message = FALLBACK.format(float(driver.states()[0][stopped]))
-                        return by_direct(driver, alpha, looked, across)[0], message
+                        return by_direct(driver, alpha, result, across)[0], message
                     _add_since_settled(driver, j, part, is_across, integrated, count, own)
                     out += factor * own
             if reduction.is_magnitude:

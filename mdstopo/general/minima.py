@@ -47,7 +47,8 @@ LANDED = 1e-6
 
 
 class Pieces:
-    """The steps of a motion, cut where the largest force changes hands, or a switch of an expression its side.
+    """The steps of a motion, cut where another member carries the largest force, or a switch of an expression
+    changes its side.
 
     On each, response j is smooth.
 
@@ -99,14 +100,15 @@ class Pieces:
         return np.asarray(np.where(c >= 1.0, high, low + c * (high - low)))
 
     def value(self, k: int, fractions: FloatArray) -> FloatArray:
-        """Values at fractions of the step that piece k is in, of the member that leads there."""
+        """Values at fractions of the step that piece k lies in, of the member that carries the largest force in this
+        piece."""
         real = np.column_stack([np.full(len(fractions), float(self._step[k])), fractions])
         seen = self._driver.sample_response(self._j, real, True, self.count, who=int(self._member[k]), rates=False)[2]
         value: FloatArray = seen[:, 0]
         return value
 
     def place_before(self, b: int) -> FloatArray:
-        """(2,): step and fraction where the piece in front of piece b ends."""
+        """(2,) step and fraction at which the piece before piece b ends."""
         return np.array([float(self.leads[b - 1].step), self.leads[b - 1].high])
 
     def row_before(self, b: int) -> FloatArray:
@@ -114,13 +116,13 @@ class Pieces:
         step, fraction = self.place_before(b).tolist()
         return row_of(float(self.t[b]), 0.0, step, fraction, 0.0, 1.0, -1.0)
 
-    def beside(self, b: int) -> tuple[FloatArray, FloatArray]:
-        """Value, rate and member (3,) where the piece in front of piece b ends, and where piece b begins."""
+    def one_sided_limits(self, b: int) -> tuple[FloatArray, FloatArray]:
+        """Value, rate and member (3,) at the end of the piece before piece b, and at the beginning of piece b."""
         before, behind = self.evaluate_at(np.array([[b - 1.0, 1.0], [b, 0.0]]), True)
         return before, behind
 
     def is_stated(self, b: int) -> bool:
-        """Whether the time in front of piece b is one of the case's, or an event's."""
+        """Whether the time between piece b and the one before it is given by the case, or is an event's."""
         lead = self.leads[b]
         if lead.low > 0.0:
             return False
@@ -130,7 +132,7 @@ class Pieces:
         return happened > 0 or bool(np.any(driver.times == self.t[b]))
 
     def settle(self, row: FloatArray, k: int, c: float) -> None:
-        """Say in a row of piece k that its place is fraction c of its step."""
+        """Set the place in a row of piece k: fraction c of its step, and the time."""
         lead = self.leads[k]
         row[STEP], row[FRACTION] = lead.step, c
         row[TIME] = self.t[k] + (c - lead.low) / (lead.high - lead.low) * (self.t[k + 1] - self.t[k])
@@ -159,7 +161,7 @@ def _at_boundary(row: FloatArray, pieces: Pieces, b: int, highest: float, stated
 
     stated: whether the time is given, or an event's: then it varies as that does.
     """
-    before, behind = pieces.beside(b)
+    before, behind = pieces.one_sided_limits(b)
     row[VALUE] = (before if row[FRACTION] == pieces.leads[b - 1].high else behind)[0]
     (falls, first), (rises, second) = before[1:].tolist(), behind[1:].tolist()
     if not falls <= 0.0 <= rises or falls == rises:

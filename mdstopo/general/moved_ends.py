@@ -106,7 +106,7 @@ def _order(rows: IndexArray) -> IndexArray:
 
 
 class MovedEnds:
-    """Puts the ends of members where the values of variables have them."""
+    """Moves the ends of members to where the values of variables have them, in the arrays of a model."""
 
     def __init__(self, case: Case, load_case: LoadCase, model: GeneralModel, blocks: Blocks) -> None:
         self._case = case

@@ -35,7 +35,8 @@ ALLOWED = "masses, inertias, gravity, loads over given times, and velocities at 
 
 
 class NumbersOfScene:
-    """What of one load case follows from names beside laws and points."""
+    """The numbers of one load case, beside those of laws and points, that follow from design variables which are
+    defined names."""
 
     def __init__(self, case: Case, load_case: LoadCase, model: GeneralModel) -> None:
         assert case.follows is not None
@@ -58,7 +59,8 @@ class NumbersOfScene:
         return model._replace(**self._arrays(values))
 
     def with_twins(self, model: GeneralModel, bodies: Kinematics) -> GeneralModel:
-        """The arrays with the twins of the names that were put in last, in the same segments."""
+        """The arrays with the scenes that differ in one name each, at the values that were put in last, in the same
+        segments."""
         if not self._twins:
             return model
         packed = [[pack_general(landed(each, model.times.tolist()), bodies) for each in pair] for pair in self._twins]

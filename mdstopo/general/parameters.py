@@ -249,7 +249,8 @@ def add_force_parameters(model, segment, group, who, t, member_state, q, v, a, s
 
 @kernel
 def event_slope(model, history, member_state, event, e):
-    """Derivative of the time of an event by the parameter of entry e of `varied`: dt_e/dp = -m_p/m' (s per unit of p).
+    """Derivative of the time of an event by the parameter of entry e of `varied`: dt_e/dp = -m_p/m' with the margin
+    m (s per unit of p).
 
     0 where the parameter is not in the margin m of the member that switched, or where the time is given. The modes
     in member_state are perhaps changed to those just before the event.
@@ -367,7 +368,8 @@ def begins_or_ends(model, history, count, state, e):
 
 @kernel
 def time_jump(model, history, member_state, count, state, e, j, square, dv):
-    """What shifting the time of entry e of `varied`, at which laws begin or end to act, does at one state.
+    """The jump of the derivatives at one state by the time of entry e of `varied`, at which laws begin or end to
+    act.
 
     Entries with the same value are shifted together: the first of them stands for all.
 
@@ -433,7 +435,7 @@ def time_jump(model, history, member_state, count, state, e, j, square, dv):
 
 @kernel
 def add_times(model, history, member_state, count, state, j, square, lam_v, rate, out):
-    """Add what shifting the times does, at one state, at which laws begin or end to act.
+    """Add the derivatives, at one state, by times at which laws begin or end to act.
 
     Constant:
       model: the compiled scene.

@@ -170,7 +170,8 @@ def has_no_peak(h, left, right, sign, limit):
 
 @kernel
 def mark_low(motion, j, both, closeness, plain):
-    """Set `plain` to LOW for steps that are out of the question by what the response is at their stages.
+    """Set `plain` to LOW for steps in which the response, by its values at their stages, cannot come near its
+    highest.
 
     These are at hand, and need no balance. They lie beside the motion by less than the response changes by within the
     step; stages beyond the end of a step that ends at a switch are left out. Nothing is set where steps have few
@@ -263,7 +264,7 @@ def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
 
 @kernel
 def add_row(rows, found, t, w, c, sample, sign):
-    """Write a row of what is at a place of a piece.
+    """Add a row of what was found at a place of a piece.
 
     rows (room, COLUMNS), found: row number `found` is written.
     t (P + 1,): ends of the pieces (s).
@@ -431,7 +432,8 @@ def peaks_inside(tag, motion, j, who, pieces, t, seen, plain, sign, limit, rows,
 
 @kernel
 def moves_off(seen, plain, sign, size):
-    """Of a start from rest: -1 where the first sample that differs by more than rounding is lower, or none does; 1.
+    """Whether a response that starts from rest rises at first (1) or not (-1), by the first sample that differs by
+    more than rounding.
 
     seen (P, SAMPLES, 3), plain (P,): samples, and where there are none inside.
     sign: 1 for peaks of g, -1 for those of -g. size: the largest |g|.
@@ -635,7 +637,7 @@ def peaks_of_steps(
 
 @kernel
 def highest(tag, motion, j, both, fine, closeness, out):
-    """`peaks_of_steps` of a finished motion.
+    """`peaks_of_steps` of a motion that has been unpacked.
 
     tag: the method of integration (`method_interface`).
     motion: the motion (`dense_output.Motion`).

@@ -90,7 +90,7 @@ def count_sets(model):
 
 @kernel
 def slot_of(model, i):
-    """The slot of padded member i and its block; -1, -1 where its law does not remember."""
+    """The place of member i among those with a permanent set, and its block; -1, -1 where its law does not remember."""
     slot = 0
     for k in range(model.block.shape[0]):
         if not law_remembers(model.block[k, CODE]):
@@ -266,8 +266,8 @@ def _add_force_sets(model, member_state, segment, group, who, q, v, scale, out):
 
 
 @kernel
-def add_looked_sets(model, member_state, segment, j, who, slopes, t, q, v, a, bars, scale, out):
-    """Add the derivatives, at fixed motion, of any response by the permanent sets.
+def add_response_sets(model, member_state, segment, j, who, slopes, t, q, v, a, bars, scale, out):
+    """Add the derivatives of any response by the permanent sets, at fixed motion.
 
     Constant:
       model: the compiled scene.
@@ -304,7 +304,8 @@ def made_set(model, history, e):
 
 @kernel
 def time_back(model, history, e, pulled, bar):
-    """Add to bar (slots,), the cotangents of the sets, that of the time of event e, which depends on its member's set.
+    """Pull the cotangent of the time of event e back to the permanent set of its member, on which that depends:
+    added to bar (slots,).
 
     pulled: derivative of the value that is differentiated by the time of the event (per s).
     """

@@ -102,7 +102,7 @@ def states_of_sum(
 
 @entry
 def keep_states(ints, floats, q, v, a, pairs, pose, pose_a):
-    """Relative poses of pairs at states, and their second derivatives in time.
+    """Store relative poses of pairs at states, and their second derivatives in time.
 
     In:
       ints, floats: the packed scene (`pack_general`).

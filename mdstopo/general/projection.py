@@ -186,7 +186,7 @@ def _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope, shift):
 
 @kernel
 def swept(model, workspace, h, x, y):
-    """Solve [M + H^T, Phi_q^T; Phi_q, 0] by sweeps with the factors of H = 0, which are in the workspace.
+    """Solve [M + H^T, Phi_q^T; Phi_q, 0] iteratively, with the factors for H = 0 that are in the workspace.
 
     H is as small as what a step has drifted, so few sweeps do. Returns whether they have settled.
 

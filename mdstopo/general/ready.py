@@ -21,9 +21,8 @@ class _Kept:
 
 
 class Ready:
-    """Entries prepared with their arrays (`Entry.prepare`), and again where one of these is another: a call takes a
-    microsecond instead of twenty.
-    """
+    """Compiled functions prepared with their arguments (`Entry.prepare`), again where an argument is another: a call
+    then takes a microsecond instead of twenty."""
 
     def __init__(self) -> None:
         self._kept: dict[str, _Kept] = {}

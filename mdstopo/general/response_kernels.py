@@ -26,7 +26,7 @@ Function = Kernel | Callable[..., Any]
 
 @dataclass(frozen=True, kw_only=True)
 class VectorKernels:
-    """A response that is a component or the norm of a vector.
+    """The kernels of a response that is a component or the norm of a vector.
 
     In a plane there are two more. across: the component perpendicular to the vector, a quarter turn ahead, with its
     slopes added, its direction held; components (..., out): the vector itself into out (2,).
@@ -40,7 +40,7 @@ class VectorKernels:
 
 @dataclass(frozen=True, kw_only=True)
 class ResponseKernels:
-    """A response g(q, v, a, lam).
+    """The kernels of a response g(q, v, a, lam), and what it can do.
 
     value: g_j, with its slopes added to bars and row_bar.
     vector: of a component or a norm. absolute: whether it is an absolute value, or a largest one, which has kinks.

@@ -7,7 +7,7 @@ from mdstopo.general.general_responses import has_norm, is_absolute
 
 
 def shape_of(model: GeneralModel, j: int, reduction: ReductionKind) -> Shape:
-    """The shape (`evaluation.Peak`) of the values of response j, reduced over time so."""
+    """How the value of response j, with this reduction, is formed: plain, absolute or a norm (`evaluation.Peak`)."""
     if reduction.is_integral:
         return "plain"
     if has_norm(model, j):

@@ -27,7 +27,7 @@ class _Block(NamedTuple):
 
 
 class WantedRow(NamedTuple):
-    """A row of which a derivative is wanted, or a part of one.
+    """A row of which a derivative is wanted, or one part of its derivative.
 
     response, row: numbers of what it belongs to. is_across: 1 where the component across a norm's vector is meant, else
     0. share: of the derivative of that. at (COLUMNS,): the row that is differentiated (`extremes`).
@@ -58,7 +58,7 @@ def wanted_rows(driver: "GeneralDriver", across: bool) -> list[WantedRow]:
 
 
 def sign_of(driver: "GeneralDriver", j: int, r: int) -> float:
-    """The sign with which the derivative of the quantity in row r stands in that of response j."""
+    """The sign of the derivative of response j in that of row r: -1 where a magnitude is that of a negative value."""
     return driver.rows.item(j, r, SIGN) if driver.scene.reductions[j].is_magnitude else 1.0
 
 
@@ -102,7 +102,7 @@ class RowGradients:
                         driver.gradients[j, r] = 0.0
 
     def compile(self) -> None:
-        """Have the machine code for it on the disk."""
+        """Compile what computes the gradients, without computing any."""
         self._driver.entry.rows_vjp.compile(*self._arguments(0, self._block(1)))
 
     def _arguments(self, count: int, block: _Block) -> tuple[Any, ...]:

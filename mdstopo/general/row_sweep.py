@@ -28,7 +28,7 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 
 class Units(NamedTuple):
-    """What unit cotangents go through a step with, U of them: twice as many as there are free coordinates.
+    """Unit cotangents that are pulled through a step once for many rows, U of them: two for each free coordinate.
 
     place (U / 2,): the free coordinates. lam_q, lam_v (U, n), lam_x (U, 2, n), bar_set (U, slots), z (U, 17, n),
     out (U, M_padded + P), fraction (U,): as of `through_step`.
@@ -191,7 +191,7 @@ def through_step_by_units(
 
 @part
 def add_share(share, x, out):
-    """out += share x."""
+    """Add a multiple of one vector to another: out += share x."""
     for i in range(out.shape[0]):
         out[i] += share * x[i]
 

@@ -23,7 +23,7 @@ ROUNDING = 4e-15
 
 @kernel
 def scene_size(model):
-    """A length of the scene, m: what rounding of positions is measured against."""
+    """A length of the scene (m), which rounding of positions is relative to."""
     size = 0.0
     for p in range(model.reach.shape[0]):
         size = max(size, model.reach[p])
@@ -68,7 +68,7 @@ def start_modes(model, member_state, workspace, q, v, a, lam, knots):
 
 @kernel
 def motion_at_start(model, member_state, workspace, rel, v, stiffness, motion, noise):
-    """How far each pair is strained at the start, and what rounding leaves of that.
+    """By how much each pair is strained at the start, and how uncertain rounding makes that.
 
     Constant:
       model: the compiled scene.

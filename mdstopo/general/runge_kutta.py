@@ -40,19 +40,19 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
 
 @kernel
 def step_error(tag, vectors, s, h, longest, a, weight):
-    """That of springs, too; see `method_interface.step_error`."""
+    """The estimated error of a step, the same as for springs alone; see `method_interface.step_error`."""
     return springs_runge_kutta.step_error(vectors, s, h, longest, a, weight)
 
 
 @kernel
 def scheme(tag, method):
-    """Of two schemes; see `method_interface.scheme`."""
+    """One of two schemes of the method; see `method_interface.scheme`."""
     return STAGES[method], ORDERS[method], FIRST_ERRORS[method]
 
 
 @kernel
 def is_explicit(tag):
-    """Stages follow from those before them."""
+    """Whether stages follow from those before them: those of Runge-Kutta do."""
     return True
 
 

@@ -52,7 +52,7 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
 
 @kernel
 def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, workspace, work):
-    """Stage after stage, the last one first; see `method_interface.step_back`.
+    """Pull cotangents back through a step, its last stage first; see `method_interface.step_back`.
 
     Not used: c (a point inside a step is the end of a partial one), lam_x (nothing else is carried from step to step).
     """
@@ -61,7 +61,8 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
 
 @kernel
 def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
-    """Stage after stage; see `method_interface.step_forward`. Returns True.
+    """Push changes at the start of a step through its stages to its end; see `method_interface.step_forward`.
+    Returns True.
 
     Not used: c, sweeps, dx: partial steps are steps of their own, no stage is implicit, nothing else is carried.
     """
@@ -70,8 +71,11 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
 
 
 @kernel
-def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
-    """On a parabola with the accelerations at c; see `method_interface.beside`. Not used: history, k, c."""
+def state_at_offset(tag, model, history, k, c, e, q, v, a, q_out, v_out):
+    """The state a little later, on a parabola with the accelerations at c; see `method_interface.state_at_offset`.
+
+    Not used: history, k, c.
+    """
     advance_coordinates(model, q, v, a, e, q_out)
     for d in range(v.shape[0]):
         v_out[d] = v[d] + e * a[d]
@@ -79,19 +83,19 @@ def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
 
 @kernel
 def derivatives(tag):
-    """How many derivatives of the motion are those of the balance: velocities and accelerations."""
+    """How many derivatives of the motion are exact: velocities and accelerations."""
     return 2
 
 
 @kernel
 def is_continuous(tag):
-    """A partial step has all its stages."""
+    """Whether the state inside a step costs no forces: no, a partial step has all its stages."""
     return False
 
 
 @kernel
 def weights_of(tag, model, tables, history, w, out):
-    """As of the velocity of one more coordinate; see `method_interface.weights_of`."""
+    """Weights of the stages in an integral: those of a velocity; see `method_interface.weights_of`."""
     table, stages = table_of_step(tag, model, tables, history, w)
     for j in range(stages):
         out[j] = (history.t[w + 1] - history.t[w]) * table[2, 2, j]
@@ -102,7 +106,7 @@ COMMON: dict[str, Any] = {
     "point_of": point_of,
     "step_back": step_back,
     "step_forward": step_forward,
-    "beside": beside,
+    "state_at_offset": state_at_offset,
     "derivatives": derivatives,
     "is_continuous": is_continuous,
     "weights_of": weights_of,

@@ -23,7 +23,8 @@ _TWINS = {"PlanarView": planar_twin, "SpatialView": spatial_twin}
 
 
 def twin_of(model, b, side):
-    """The scene with number b larger (side 0) or smaller (side 1): masses, loads and velocities alone."""
+    """A scene that differs in number b alone, which is larger (side 0) or smaller (side 1): masses, loads and
+    velocities."""
     raise NotImplementedError
 
 
@@ -121,7 +122,7 @@ def add_numbers_of_rows(model, segment, history, at, z, j, out):
 
 @kernel
 def add_start_velocities(model, lam_v, out):
-    """Add what the velocities at the start, with cotangents lam_v (n,), have of derivatives: out (M_padded + P,)."""
+    """Add the derivatives by the velocities at the start, whose cotangents are lam_v (n,): out (M_padded + P,)."""
     count = model.apart.shape[0]
     for b in range(count):
         one = twin_of(model, b, 0)
@@ -132,7 +133,7 @@ def add_start_velocities(model, lam_v, out):
 
 @kernel
 def begin_velocities(model, column):
-    """Put the derivatives of the velocities at the start into column (M_padded + P, 4 n + 1) of `direct`."""
+    """Put the derivatives of the start velocities into column (M_padded + P, 4 n + 1) of `direct`."""
     n = model.mass.shape[0]
     count = model.apart.shape[0]
     for b in range(count):
@@ -144,7 +145,7 @@ def begin_velocities(model, column):
 
 @kernel
 def number_through_step(model, b, history, w, segment, matrix, spare):
-    """Add what number b does at the stages of step w to what becomes of the state by it.
+    """Add the derivative of the state at the end of step w by number b that comes from the forces at its stages.
 
     Constant:
       model: the compiled scene. b: the number; below 0 it is none of these.

@@ -96,7 +96,7 @@ def statics(ints, floats, alpha, member_state, q, lam, force, stiffness, rows, p
 
 @entry
 def unit_forces(ints, floats, alpha, member_state, q, out):
-    """What the alpha^mu of each design member adds to the forces at rest: -f_i B_i^T.
+    """The slopes of the forces at rest by alpha^mu of each design member: -f_i B_i^T.
 
     Constant:
       ints, floats: the packed scene (`pack_general`).
@@ -128,7 +128,7 @@ def unit_forces(ints, floats, alpha, member_state, q, out):
 
 @entry
 def value_forces(ints, floats, alpha, member_state, q, out):
-    """What each value of variables adds to the forces at rest: -sum s (f_p B^T + f B_p^T) over its members.
+    """The slopes of the forces at rest by each value of variables: -sum s (f_p B^T + f B_p^T) over its members.
 
     Times at which laws begin or end to act add nothing, nor does what multiplies rates.
 

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 
 class SinceSettled:
-    """Those responses of one driver, and where they count from with its last design."""
+    """The displacements among a driver's responses that count from the settled start, and where they count from at
+    present."""
 
     def __init__(self, driver: "GeneralDriver") -> None:
         self._driver = driver
@@ -43,7 +44,7 @@ class SinceSettled:
         return numbers
 
     def row_cotangent(self, j: int, row: FloatArray, across: bool, count: int) -> FloatArray:
-        """(n,): what a row of `extremes` pulls on the place that response j counts from.
+        """(n,) the derivative of a row of `extremes` by the place from which response j counts.
 
         across: of a norm the component perpendicular to its vector is meant. count: how many steps the motion has.
         """
@@ -52,7 +53,7 @@ class SinceSettled:
         return self.cotangent(j, q[0], across)
 
     def cotangent(self, j: int, q: FloatArray, across: bool = False) -> FloatArray:
-        """The same at q (n_q,)."""
+        """The derivative of response j by the settled start, at coordinates q (n_q,)."""
         u, _ = self._components(j, q)
         component = int(self._driver.scene.model.response[j, COMPONENT])
         if component == NORM:
@@ -66,7 +67,8 @@ class SinceSettled:
         return pulled
 
     def integral_cotangent(self, j: int, integral: int, count: int) -> FloatArray:
-        """(n,): the same of the integral of response j over so many steps (2: of its square)."""
+        """(n,) the derivative of the integral of response j (2: of its square) over so many steps by the place from
+        which it counts."""
         from mdstopo.general.since_settled_entry import integral_by_place
 
         d = self._driver

@@ -50,7 +50,8 @@ def least_singular_value(model, workspace):
 
 @kernel
 def way_to_pose(h, before, now, largest):
-    """Time until sigma vanishes, that was `before` a step of length h and is `now`; infinite where it need not."""
+    """The time until sigma vanishes, from its values `before` and `now` at a distance h; infinite where it may not
+    vanish."""
     if not now < before or now > WATCH * largest:
         return np.inf
     return h * now / (before - now)
@@ -58,7 +59,7 @@ def way_to_pose(h, before, now, largest):
 
 @kernel
 def step_beside(h, way, must, nodes, s):
-    """A step of about h that neither ends nor has a stage near the pose that is `way` ahead.
+    """A step of about h that does not end, and has no stage, near the singular pose that is `way` ahead.
 
     must: whether it has to cross the pose, however short h is; nodes (s,): where its stages are.
     """

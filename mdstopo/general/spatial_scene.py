@@ -11,6 +11,7 @@ import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import GROUND, Case, Joint, Load, LoadCase, Response, Signal
+from mdstopo.case.responses import kind_of
 from mdstopo.compiler.kernel import Kernel
 from mdstopo.general.contact_compile import surface_rows
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
@@ -244,7 +245,7 @@ def _response_row(response: Response, frames: Frames) -> list[float]:
     if response.at_local is not None:
         row[AT] = in_frame(frames, body, np.array(response.at_local, dtype=np.float64))
     numbers = np.array(response.numbers, dtype=np.float64)
-    if response.kind == "tilt":
+    if kind_of(response).of_axis:
         numbers = in_frame(frames, body, numbers)
     row[NUMBERS][: len(numbers)] = numbers
     return [float(value) for value in row]

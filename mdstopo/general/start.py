@@ -33,7 +33,7 @@ FITS = 1e-8
 
 
 class SettledStart:
-    """The start of one driver at rest; `settled` is that of the last design."""
+    """The equilibrium at which the motion of one driver starts; `settled` is that of the last design."""
 
     def __init__(self, driver: "GeneralDriver") -> None:
         self._driver = driver
@@ -74,7 +74,7 @@ class SettledStart:
         return slopes
 
     def vjp(self, start: FloatArray, out: FloatArray) -> None:
-        """out (N + P,) += what the start's positions, with cotangents start (n,), have of the design's derivative."""
+        """Add the derivative of the start's positions, with cotangents start (n,), by the design to out (N + P,)."""
         assert self.settled is not None
         driver = self._driver
         model, alpha = driver.scene.model, driver.alpha

@@ -132,7 +132,7 @@ def carve_history(model, limits, floats, ints):
 
 @kernel
 def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
-    """Store a stage.
+    """Store the state, accelerations and tangents of a stage.
 
     history: the history of steps (`StepHistory`).
     o: number of the stage.
@@ -198,13 +198,13 @@ def has_factors(history):
 
 @kernel
 def mass_of(history, o):
-    """The inerters' mass at stage o."""
+    """The mass that inerters add at stage o, as the history keeps it."""
     return history.mass[o if history.mass.shape[0] > 1 else 0]
 
 
 @kernel
 def keep_state(history, k, t, q, v, mu, nu):
-    """Store a state.
+    """Store the state at the end of a step.
 
     history: the history of steps (`StepHistory`).
     k: number of the state.
@@ -245,6 +245,6 @@ def events_included(member_state):
 
 @kernel
 def copy_vector(source, target):
-    """target = source, one-dimensional."""
+    """Copy a vector: target = source."""
     for i in range(source.shape[0]):
         target[i] = source[i]

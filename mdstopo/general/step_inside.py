@@ -142,7 +142,7 @@ def table_inside(table, c, out):
 
 @kernel
 def table_of_step(tag, model, tables, history, w):
-    """The table (3, 17, 17) of step w, and the number of its stages; it may be one that ends inside (`table_inside`).
+    """The table of coefficients (3, 17, 17) with which step w was made, and the number of its stages.
 
     tag: the method of integration (`method_interface`).
     model: the compiled scene.

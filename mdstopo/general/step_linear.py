@@ -40,7 +40,7 @@ SETTLED = 1e-12
 
 @kernel
 def lay_out(model, history, o, workspace):
-    """Put the joints of stage o in the workspace, with their slopes. Returns K and C of the stage."""
+    """Put the joints of stage o, with their slopes, into the workspace. Returns K and C of the stage."""
     q = history.stage_q[o]
     v = history.stage_v[o]
     k = history.K[o]

@@ -22,7 +22,7 @@ MANY_WINDOWS, ENOUGH_WINDOWS = 50, 500
 
 
 def windows_held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
-    """In words that windows of collocation of a design alpha (N,) are held short; or nothing."""
+    """Why windows of collocation are short with the design alpha (N,), in words; empty where they are not."""
     driver.allow(ENOUGH_WINDOWS)
     try:
         driver.run(alpha, False)
@@ -35,7 +35,7 @@ def windows_held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
 
 
 def held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
-    """In words that explicit steps of a design alpha (N,) are held short by stability; or nothing."""
+    """That stability limits explicit steps with the design alpha (N,), in words; empty where it does not."""
     driver.allow(ENOUGH)
     try:
         code, _, _ = driver.run(alpha, False)

@@ -20,7 +20,7 @@ def pair_freedoms(model):
 
 @part
 def dimensions(model):
-    """D - T: components of a shift, and coordinates of a point."""
+    """How many coordinates a point has, and components a displacement: D - T."""
     return freedoms(model) - rotations(model)
 
 
@@ -46,14 +46,14 @@ def place_in_joint(model, j, r):
 
 @part
 def place_of_turn(model, d, r):
-    """The place of component r (0 to T - 1) of the turn of the body that freedom d belongs to."""
+    """The place of component r (0 to T - 1) of the rotation of the body to which freedom d belongs."""
     each = freedoms(model)
     return d - d % each + (each - rotations(model)) + r
 
 
 @part
 def is_turning(model, r):
-    """Whether entry r of a pair is about a turn."""
+    """Whether entry r of a pair's freedoms is a rotation, not a displacement."""
     each = freedoms(model)
     return r % each >= each - rotations(model)
 
@@ -66,13 +66,13 @@ def energy_column(model):
 
 @part
 def pull_column(model):
-    """Where the slope of the energy by the relative pose begins there."""
+    """Where the slope of the energy by the relative pose begins in sums over the members of a pair."""
     return freedoms(model) + 1
 
 
 @part
 def tangent_column(model):
-    """Where K begins there: what stands before is without tangents."""
+    """Where K begins in sums over the members of a pair; sums without tangents end there."""
     return 2 * freedoms(model) + 1
 
 

@@ -41,7 +41,8 @@ def __dir__() -> list[str]:
 
 
 def bundle(maker: type, fields: tuple[str, ...]) -> None:
-    """Let `maker(...)` in kernels make a structure from its fields, in their order; each maker has its own type."""
+    """Register how `maker(...)` in kernels makes a structure from its fields, in their order; each maker has its own
+    type."""
 
     @when_compiling
     def register() -> None:

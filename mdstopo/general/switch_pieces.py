@@ -27,7 +27,7 @@ SAME = 1e-9
 
 
 def switch_leads(driver: "GeneralDriver", j: int, t: FloatArray) -> list[Lead]:
-    """On which sides the switches of expression j are when, in order of time; t (m + 1,): the steps' times."""
+    """The times between which the switches of expression j keep their sides, in order; t (m + 1,): the steps' times."""
     count = len(t) - 1
     fractions = np.array(FRACTIONS)
     places = np.column_stack([np.repeat(np.arange(count), len(fractions)), np.tile(fractions, count)]).astype(float)
@@ -88,7 +88,7 @@ def switched_peaks(
             between = k if c <= 0.0 else k + 1  # the number of the boundary, if the place is one
             pieces.settle(row, k, float(pieces.fraction(np.array([k]), np.array([c]))[0]))
             if (c <= 0.0 or c >= 1.0) and 0 < between < len(pieces.leads) and not pieces.is_stated(between):
-                row[VALUE], row[RATE], _ = pieces.beside(between)[0 if c >= 1.0 else 1]
+                row[VALUE], row[RATE], _ = pieces.one_sided_limits(between)[0 if c >= 1.0 else 1]
                 speed, margin = _passed(driver, j, pieces, between)
                 if margin:
                     row[OTHER], row[SHARE] = margin, -row[RATE] / speed
@@ -99,7 +99,8 @@ def switched_peaks(
 def switched_integral(
     driver: "GeneralDriver", j: int, pieces: "Pieces", square: bool, slope: float
 ) -> list[tuple[float, FloatArray]]:
-    """What jumps of expression j do to its integral over time: rows whose derivatives are added, with their factors.
+    """How jumps of expression j at times that vary change its integral over time: rows whose derivatives are added,
+    with their factors.
 
     driver: with a finished run. j: the response.
     pieces: its pieces.
@@ -110,7 +111,7 @@ def switched_integral(
     for b in range(1, len(pieces.leads)):
         if pieces.leads[b].member == pieces.leads[b - 1].member or pieces.is_stated(b):
             continue
-        before, behind = (float(seen[0]) for seen in pieces.beside(b))
+        before, behind = (float(seen[0]) for seen in pieces.one_sided_limits(b))
         drop = before * before - behind * behind if square else before - behind
         if abs(drop) <= SAME * largest * (largest if square else 1.0):
             continue

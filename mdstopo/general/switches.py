@@ -18,7 +18,7 @@ BOTH, SECOND, FIRST = 1, 2, 3
 
 @kernel
 def switches_of(model):
-    """The switches (6,) of a new workspace."""
+    """The arrays (6,) of a new workspace for members that switch."""
     switches = np.zeros(6, np.int64)
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
     switches[DAMPED] = 1 if is_damped(model) else 0
@@ -58,7 +58,8 @@ def is_damped(model):
 
 @kernel
 def carriers(model):
-    """(n_pair,): as `movers` where members, bushings or contacts act between two bodies, 0 where only joints do."""
+    """(n_pair,) which bodies move, as of `movers`, where members, bushings or contacts act between them; 0 where only
+    joints do."""
     found = np.zeros(model.pair.shape[0], np.int64)
     for k in range(model.block.shape[0]):
         found[model.block[k, PAIR]] = 1
@@ -73,7 +74,7 @@ def carriers(model):
 
 @kernel
 def movers(model):
-    """(n_pair,): BOTH where both bodies of a pair move, SECOND or FIRST where that body alone does."""
+    """(n_pair,) which bodies of a pair move: BOTH, or FIRST or SECOND alone."""
     found = np.empty(model.pair.shape[0], np.int64)
     for p in range(found.shape[0]):
         found[p] = _movers_of(model, p)

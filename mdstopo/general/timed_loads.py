@@ -24,7 +24,8 @@ PARTS = 2048
 
 
 class TimedPart(NamedTuple):
-    """One component of a load that is a formula: what acts, as `load_follows`, its direction, its point of attack."""
+    """One component of a load that is a formula of time: its kind, as `load_follows`, its direction and point of
+    attack."""
 
     signal: TimeFormula
     kind: int
@@ -34,7 +35,7 @@ class TimedPart(NamedTuple):
 
 
 class Timed(NamedTuple):
-    """The fields of a model with loads that are formulas (`GeneralModel`)."""
+    """The fields of a `GeneralModel` for loads that are formulas of time."""
 
     timed_load: IndexArray
     timed_arm: FloatArray
@@ -102,7 +103,7 @@ def at_ends(formula: TimeFormula, times: FloatArray) -> FloatArray:
 
 
 def kink_times(case: Case, load_case: LoadCase) -> list[float]:
-    """The times at which formulas of a load case have kinks or jumps. CaseError where one has no value at some time."""
+    """Times at which formulas of a load case have kinks or jumps. CaseError where one has no value at some time."""
     found: list[float] = []
     grid = np.linspace(load_case.start, load_case.end, PARTS + 1)
     for formula in formulas_of(load_case):

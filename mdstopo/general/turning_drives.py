@@ -26,7 +26,7 @@ ROUNDING = 2e-15
 
 
 class Turning(NamedTuple):
-    """A prescribed rotation.
+    """The arrays of one prescribed rotation in space.
 
     cubics (n_seg, 3, 4): of the angles, or of the time integrals of the angular velocity's components in each segment.
     frame (9,): by rows what turns vectors of the body at home, in principal axes, into the drive's axes. rows (K, ROW):

@@ -33,7 +33,7 @@ WATCHED = 256
 
 
 def of_law(case: Case, group: MemberGroup, place: int) -> list[Variable]:
-    """The variables of one law of a group."""
+    """The design variables that are parameters of one law of a group."""
     return [each for each in case.variables if (group.name, place) in zip(each.groups, each.laws, strict=True)]
 
 
@@ -43,7 +43,8 @@ def each_member(case: Case, group: MemberGroup, place: int) -> bool:
 
 
 def lasting_times(case: Case, fine: bool) -> list[float]:
-    """Times at which laws have steps end, without those that vary; fine: as of `law_table.breakpoints`."""
+    """Times at which steps have to end because of laws, without those times that vary; fine: as of
+    `law_table.breakpoints`."""
     return [
         time
         for group in case.members
@@ -90,7 +91,7 @@ def _blocks(case: Case, block: IndexArray) -> dict[tuple[str, int], list[int]]:
 
 
 def as_computed(case: Case) -> Case:
-    """The case as kernels have it: laws by formula that are springs are the built-in ones."""
+    """The case as kernels compute it: laws by formula that equal springs are the built-in ones."""
     if not any(isinstance(law, OfFormulas) for group in case.members for law in group.laws):
         return case
     from mdstopo.general.formula_springs import with_springs
@@ -99,7 +100,8 @@ def as_computed(case: Case) -> Case:
 
 
 def varied(case: Case, block: IndexArray) -> IndexArray:
-    """(n_varied, 6): `GeneralModel.varied`, of which `Placing` sets the column that tells of times at an end."""
+    """(n_varied, 6) which numbers of laws vary (`GeneralModel.varied`); `Placing` sets the column for times at which
+    laws begin or end."""
     if not case.variables:
         return np.zeros((0, VARIED_COLUMNS), dtype=np.int64)
     blocks = _blocks(case, block)
@@ -119,7 +121,7 @@ def varied(case: Case, block: IndexArray) -> IndexArray:
 
 
 def along(rows: IndexArray) -> FloatArray:
-    """(n_varied, WIDTH): `GeneralModel.along` of entries (n_varied, 6) before any values are known: zeros."""
+    """(n_varied, WIDTH) the field `GeneralModel.along` before any values are known: zeros."""
     return np.zeros((len(rows), WIDTH))
 
 
@@ -151,7 +153,7 @@ class Placing:
         self.initial = np.concatenate([each.initials for each in case.variables])
 
     def at(self, model: GeneralModel, values: FloatArray) -> GeneralModel:
-        """The arrays with values (P,) in them."""
+        """The model with the values (P,) of variables in its arrays."""
         if self._scene is not None:  # names of the scene come last
             model = self._scene.at(model, values[len(values) - self._scene.count :])
         if self._ends is not None:
@@ -199,5 +201,6 @@ class Placing:
         return model._replace(active=active, varied=varied)
 
     def with_twins(self, model: GeneralModel, bodies: Kinematics) -> GeneralModel:
-        """The arrays at the values that were put in last, with the twins that numbers of the scene need."""
+        """The arrays at the values that were put in last, with the scenes that differ in one number each, for its
+        derivatives."""
         return model if self._scene is None else self._scene.with_twins(model, bodies)

@@ -72,13 +72,13 @@ def _run(driver: SceneDriver, alpha: FloatArray, step: float) -> _Run | None:
         if not driver.shapes:
             status, steps = driver.simulate(alpha)
             return _Run(steps.t.copy(), driver.displacements(steps.q), ()) if status is Status.OK else None
-        looked = driver.evaluate(alpha, True)
-        if looked.status is not Status.OK:
+        result = driver.evaluate(alpha, True)
+        if result.status is not Status.OK:
             return None
         rows = []
-        for j, count in enumerate(looked.found.tolist()):
-            values = looked.rows[j, :count]
-            rows.append((values[:, 0].copy(), values[:, 1].copy(), looked.gradients[j, :count].copy()))
+        for j, count in enumerate(result.found.tolist()):
+            values = result.rows[j, :count]
+            rows.append((values[:, 0].copy(), values[:, 1].copy(), result.gradients[j, :count].copy()))
         return _Run(np.zeros(0), np.zeros((0, 0, 0)), tuple(rows))
     finally:
         driver.settings[2] = kept

@@ -29,7 +29,7 @@ ROWS = 4
 
 
 class Driver:
-    """One scene, one method, ready to run."""
+    """One scene of springs between free bodies and one integrator, with all arrays, ready to run."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class Driver:
         self._entry: Any = None
         self._load_responses = load_responses
         self._responses: Any = None
-        self._beside = options.beside
+        self._background = options.background
         self.packed = self._plain = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
         #: coordinates, pairs, whether anything depends on velocity, whether loads turn: what room is made for
@@ -83,16 +83,16 @@ class Driver:
         """The method's compiled entries, imported when first used."""
         if self._entry is None:
             self._entry = import_module(self.method.kind.springs)
-            if self._beside is not None and self._beside.due:
+            if self._background is not None and self._background.due:
                 self._entry.simulate.compile(*self._simulate_arguments(False))
         return self._entry
 
     @property
     def response_entries(self) -> Any:
         """The entries that evaluate responses; where they have never been compiled, another process is doing it."""
-        if self._beside is not None:
-            self._beside.wait()
-            self._beside = None
+        if self._background is not None:
+            self._background.wait()
+            self._background = None
         return self._loaded_responses()
 
     def _loaded_responses(self) -> Any:
@@ -276,21 +276,21 @@ class DenseSteps:
 
     @property
     def q(self) -> FloatArray:
-        """(count + 1, n) coordinates."""
+        """(count + 1, n) coordinates at the ends of the steps."""
         return self.state[:, Q]
 
     @property
     def v(self) -> FloatArray:
-        """(count + 1, n) velocities."""
+        """(count + 1, n) velocities at the ends of the steps."""
         return self.state[:, V]
 
     def balanced(self, times: FloatArray) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """`at`, and lam (T, 0): nothing is constrained."""
+        """Coordinates, velocities and accelerations as of `at`, and no multipliers: nothing is constrained."""
         q, v, a = self.at(times)
         return (q, v, a), np.zeros((len(times), 0))
 
     def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
-        """There are no joints."""
+        """Forces and moments in joints: none, there are no joints."""
         return {}
 
     def at(self, times: FloatArray) -> FloatArray:

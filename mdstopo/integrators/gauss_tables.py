@@ -48,7 +48,8 @@ def _nodes(s: int) -> tuple[AnyFloats, AnyFloats]:
 
 
 def integrals(c: AnyFloats, count: int) -> tuple[AnyFloats, AnyFloats, AnyFloats]:
-    """P_k, I1_k, I2_k for k < count at c in [0, 1]: three arrays (len(c), count)."""
+    """Legendre polynomials and their integrals: P_k, I1_k, I2_k for k < count at c in [0, 1], three arrays (len(c),
+    count)."""
     p = _legendre(2 * c - 1, count + 2)
     first = [c] + [(p[k + 1] - p[k - 1]) / (2 * (2 * k + 1)) for k in range(1, count + 1)]
     second = [c * c / 2] + [(first[k + 1] - first[k - 1]) / (2 * (2 * k + 1)) for k in range(1, count)]

@@ -12,7 +12,7 @@ from mdstopo.compiler.vector import WIDE, lanes, larger, largest, load, magnitud
 
 @part
 def row_width(n):
-    """Length of a row of n coordinates."""
+    """The length of a row that is padded for vectors, of n coordinates."""
     return (n + WIDE - 1) // WIDE * WIDE
 
 
@@ -27,7 +27,7 @@ def make_rows(count, n):
 
 @part
 def copy_row(source, target):
-    """target (W,) = source (n,), zeros after it."""
+    """Copy a vector into a longer row: target (W,) = source (n,), with zeros after it."""
     target[:] = 0.0
     for d in range(source.shape[0]):
         target[d] = source[d]
@@ -160,7 +160,7 @@ def add_products(matrix, x, s, base, out):
 
 @part
 def scale_rows(factor, x, s, out):
-    """out[i] = factor x[i] for i < s; factor (W,)."""
+    """Multiply the first s rows by factors (W,): out[i] = factor x[i]."""
     for d in range(0, x.shape[1], lanes()):
         f = load(factor, d)
         for i in range(s):
@@ -169,7 +169,7 @@ def scale_rows(factor, x, s, out):
 
 @part
 def subtract_rows(x, y, s, out):
-    """out[i] = x[i] - y[i] for i < s."""
+    """Subtract the first s rows: out[i] = x[i] - y[i]."""
     for d in range(0, x.shape[1], lanes()):
         for i in range(s):
             store(out[i], d, load(x[i], d) - load(y[i], d))
@@ -177,7 +177,7 @@ def subtract_rows(x, y, s, out):
 
 @part
 def take_rows(x, s, out):
-    """out[i] = x[i] for i < s."""
+    """Copy the first s rows: out[i] = x[i] for i < s."""
     for d in range(0, x.shape[1], lanes()):
         for i in range(s):
             store(out[i], d, load(x[i], d))

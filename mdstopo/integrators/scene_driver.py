@@ -32,12 +32,12 @@ class Method:
 
     @property
     def name(self) -> str:
-        """As in the case file."""
+        """The name of the integrator, as the case file has it."""
         return self.kind.name
 
 
 class Compiling(Protocol):
-    """Another process that may be compiling what evaluates responses (`warm.Beside`).
+    """Another process that may be compiling what evaluates responses (`warm.BackgroundCompiler`).
 
     due: whether that has never been compiled here; wait: until the process has ended.
     """
@@ -117,7 +117,8 @@ class Steps(Protocol):
     def v(self) -> FloatArray: ...
 
     def balanced(self, times: FloatArray) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """q (T, n_q) and v, a (T, n), and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
+        """States and accelerations at times (T,): q (T, n_q), v, a (T, n) and lam (T, n_rows) of joints and motions;
+        right-continuous."""
 
     def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
         """Joint name -> force and moment (T, D) on its first body at the joint, global axes.
@@ -154,7 +155,7 @@ class SceneDriver(Protocol):
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate a design and evaluate all responses, and on demand their gradients by the discrete adjoint."""
 
-    def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
+    def differentiate(self, method: str, alpha: FloatArray, result: ResponseResult, cones: bool) -> Differentiated:
         """Gradients of what `evaluate` found, by a method that is no part of it; cones: tell `across`, too."""
 
     def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
@@ -173,7 +174,7 @@ class SceneDriver(Protocol):
         """A member whose ends meet under force within the steps of the last run, or -1."""
 
     def member(self, padded: int) -> str:
-        """A member in words."""
+        """A member in words, from its place in the padded arrays."""
 
     def explain(
         self, alpha: FloatArray, status: Status, time: float, q: FloatArray, v: FloatArray
@@ -200,16 +201,16 @@ class DriverOptions:
     """What a driver is made for, beside its scene.
 
     method: the integrator. tolerance: relative error that objectives and gradients may have. step: fixed step (s); 0:
-    adaptive steps; negative: see `springs_generalized_alpha.longest_step`. looked: the responses, those of objectives
-    first. design (N + P,): the array that every design is put in, shared with whoever gives designs. beside: another
-    process that may be compiling what evaluates responses. fits: whether joints are to fit at the start, which a kernel
-    finds out.
+    adaptive steps; negative: see `springs_generalized_alpha.longest_step`. aims: the responses, those of objectives
+    first. design (N + P,): the array that every design is put in, shared with whoever gives designs. background:
+    another process that may be compiling what evaluates responses. fits: whether joints are to fit at the start, which
+    a kernel finds out.
     """
 
     method: Method
     tolerance: float
     step: float
-    looked: Sequence[Objective | ResponseRow]
+    aims: Sequence[Objective | ResponseRow]
     design: FloatArray
-    beside: Compiling | None = None
+    background: Compiling | None = None
     fits: bool = True

@@ -51,7 +51,7 @@ WORK = 15
 
 
 def work_named(counts: Sequence[int]) -> dict[str, int]:
-    """Work counts (WORK,) by their names."""
+    """Counts of work (WORK,) by their names."""
     forces, tangents, accepted, rejected, newton, sweeps, reverse, design, springs = counts[:OF_STARTS]
     starts, lost, switches, samples, points, held = counts[OF_STARTS:]
     return {
@@ -94,7 +94,7 @@ def status_of(code: int) -> Status:
 
 
 class StepArrays:
-    """What the steps of a run are kept in, and of which each integrator makes a named tuple of its own."""
+    """The arrays in which the steps of a run are kept; each integrator makes a named tuple of its own from them."""
 
     t: Annotated[FloatArray, Field("steps + 1", "times of the states (s)")]
     state: Annotated[FloatArray, Field("steps + 1, 2, n", "q, v")]
@@ -167,7 +167,7 @@ def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning
 
 @part
 def copy_tangents(source, target):
-    """target = source, (n_pair, 6, 6)."""
+    """Copy tangents (n_pair, 6, 6): target = source."""
     for p in range(source.shape[0]):
         for i in range(6):
             for j in range(6):
@@ -257,7 +257,8 @@ def add_preloads(model, strength, rel, out):
 
 @part
 def lasting(h, longest):
-    """The factor on the error of a step of length h, for an error of velocity that drifts on; longest: step so far."""
+    """The factor by which the error of a step of length h is multiplied where its error of velocity lasts; longest: the
+    longest step so far."""
     return max(1.0, LASTING * longest / h)
 
 

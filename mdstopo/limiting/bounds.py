@@ -37,7 +37,7 @@ def bounds(case: Case) -> Mapping[str, Bound]:
 
 
 def bound(case: Case, objective: Objective) -> Bound:
-    """The bound of one objective."""
+    """The value that no members can do better than, of one objective."""
     if case.uncertainty is not None:
         return Bound(None, "the case has uncertain values: a bound would hold for one sample alone")
     if is_spatial(case):
@@ -46,9 +46,11 @@ def bound(case: Case, objective: Objective) -> Bound:
         return Bound(
             None, "ends of members are design variables: bounds are known of ends that stay in their body alone"
         )
-    if case.follows is not None:
+    if case.follows is not None and any(number.kind != "law" for number in case.follows.numbers):
         return Bound(
-            None, "a defined name is a design variable: bounds are known of numbers that vary each by itself alone"
+            None,
+            "more than numbers of laws follows from a design variable that is a defined name: bounds are known of "
+            "bodies, points, loads and motions that no design changes",
         )
     load_case = case.load_case(objective.load_case)
     if formulas_of(load_case):
@@ -111,5 +113,5 @@ def _impossible(limits: Limits, forces: list[str], excess: float) -> str:
 
 
 def unit(objective: Objective) -> str:
-    """The unit of an objective's bound."""
+    """The unit of the bound of an objective."""
     return unit_of_value(objective)

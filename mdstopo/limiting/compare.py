@@ -24,7 +24,7 @@ TOLERATED = 1e-6
 
 @dataclass(frozen=True)
 class Compared:
-    """A bound and what was reached.
+    """The bound of an objective beside the best value that a run has reached.
 
     best: the best value among the designs in a result that keep all limits, None where there is none. gap: how far it
     is from the bound, as a share of it; 0 at the bound; None where either is missing.

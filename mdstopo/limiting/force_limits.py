@@ -38,7 +38,7 @@ _CELLS = 2000
 
 @dataclass
 class Restrictions:
-    """Rows, and a sentence each on what they say; more: times at which cells have to end."""
+    """Linear restrictions on the members' forces, and a sentence on each; more: times at which cells have to end."""
 
     rows: list[Bounded] = field(default_factory=list)
     counted: list[str] = field(default_factory=list)
@@ -102,11 +102,19 @@ def _strength(case: Case, group: MemberGroup) -> float | None:
     """The largest force of a whole member of a group, N; None where it has no limit."""
     total = 0.0
     for index, law in enumerate(group.laws):
+        if _follows(case, group, index):
+            return None
         most = law.strength(_ranges(case, group, index))
         if most is None:
             return None
         total += most
     return total
+
+
+def _follows(case: Case, group: MemberGroup, index: int) -> bool:
+    """Whether numbers of a law follow from design variables that are defined names: then nothing is certain of it."""
+    laws = () if case.follows is None else case.follows.of_kind("law")
+    return any((number.group, number.law) == (group.name, index) for number in laws)
 
 
 def _ranges(case: Case, group: MemberGroup, index: int) -> Ranges:
@@ -244,6 +252,8 @@ def cone_of(middles: Floats, halves: Floats, directions: Floats) -> Floats | Non
 
 def _side(case: Case, group: MemberGroup) -> int:
     """+1 where members of a group only pull, -1 where they only push, 0 where neither is certain."""
+    if any(_follows(case, group, index) for index in range(len(group.laws))):
+        return 0
     sides = {law.side_of_force(_ranges(case, group, index)) for index, law in enumerate(group.laws)}
     return sides.pop() if len(sides) == 1 else 0
 
@@ -339,6 +349,8 @@ def _slack(case: Case, group: MemberGroup, start: float) -> float:
     """
     least = math.inf
     for index, law in enumerate(group.laws):
+        if _follows(case, group, index):
+            return 0.0
         if _from(case, group, index, law) > start:
             continue
         slack = law.slack(_ranges(case, group, index), group.length)

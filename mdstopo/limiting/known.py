@@ -25,11 +25,11 @@ class Cubics:
         return Cubics(self.times, np.einsum("ij,sjk->sik", matrix, self.coefficients))
 
     def plus(self, other: Cubics) -> Cubics:
-        """The sum, both over the same segments."""
+        """The sum of the functions and others over the same segments."""
         return Cubics(self.times, self.coefficients + other.coefficients)
 
     def minus(self, constants: Floats) -> Cubics:
-        """The functions less constants (n,)."""
+        """The functions, less constants (n,)."""
         coefficients = self.coefficients.copy()
         coefficients[:, :, 0] -= constants
         return Cubics(self.times, coefficients)

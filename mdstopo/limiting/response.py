@@ -22,7 +22,7 @@ class NoBoundError(Exception):
 
 @dataclass(frozen=True)
 class Bounded:
-    """At all times y(t) = (matrix X)(t), or its derivative of some order, is within a set.
+    """A limit on the motion at all times: y(t) = (matrix X)(t), or a derivative of it, stays within a set.
 
     matrix (r, 2 n); known: r functions that are added (X_known is not in them). radius: of the set, or None where it is
     what is minimised. by_component: every component of y is at most the radius; else the norm of y is. final: only at

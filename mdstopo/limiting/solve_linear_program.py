@@ -44,7 +44,7 @@ class Scales:
     time: float
 
     def of(self, order: int) -> float:
-        """The unit of a derivative of position."""
+        """The unit by which a derivative of position of this order is scaled."""
         return self.length / self.time**order
 
 
@@ -59,12 +59,12 @@ class Reduced:
 
     @property
     def radius(self) -> float | None:
-        """In units; None where it is minimised."""
+        """The radius of the set, in scaled units; None where it is what is minimised."""
         return None if self.source.radius is None else self.source.radius / self.unit
 
     @property
     def round(self) -> bool:
-        """Whether a norm in the plane is meant."""
+        """Whether the set is a disc: whether the norm in the plane is bounded, not each component."""
         return not self.source.by_component and len(self.matrix) == 2
 
     def directions(self) -> Floats:
@@ -88,7 +88,8 @@ class Tangent:
 
 @dataclass(frozen=True)
 class Solution:
-    """bound: certified, in the objective's own unit; the rest says where to refine: see `_refined`."""
+    """The solution of a linear program. bound: certified, in the objective's own unit; the rest says where to refine:
+    see `_refined`."""
 
     bound: float
     split: NDArray[np.bool_]
@@ -115,7 +116,7 @@ class Solve:
             self._ask(index)
 
     def solution(self) -> Solution:
-        """Raises InfeasibleError, UnsolvedError."""
+        """The solution of the linear program. Raises InfeasibleError or UnsolvedError."""
         from scipy.optimize import linprog
         from scipy.sparse import vstack
 
@@ -345,7 +346,7 @@ class Solve:
 
 
 def zero_wide(n: int, k: int) -> csr_matrix:
-    """(n k, (n + 1) k) zeros."""
+    """A sparse matrix (n k, (n + 1) k) of zeros."""
     from scipy.sparse import csr_matrix
 
     return csr_matrix((n * k, (n + 1) * k))

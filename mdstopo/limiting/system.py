@@ -50,7 +50,7 @@ class Row:
 
 
 class System:
-    """The translation of all bodies of one load case.
+    """The equations of the translation of all bodies in one load case.
 
     names: bodies as declared; times (S + 1,): segments in which all known functions are cubic; start, rate (2 n,): X
     and its derivative at the start. angles: body -> angle, of those that cannot turn (ground included).
@@ -70,7 +70,7 @@ class System:
 
     @property
     def n(self) -> int:
-        """Coordinates."""
+        """The number of coordinates of the centres of mass."""
         return 2 * len(self.names)
 
     def at(self, body: str) -> Floats:
@@ -100,16 +100,16 @@ class System:
 
     @property
     def known(self) -> Cubics:
-        """X_known, 2 n functions."""
+        """X_known: 2 n functions of time, the part of the coordinates that is known."""
         return self._solved[0]
 
     @property
     def free(self) -> Floats:
-        """Z (2 n, f)."""
+        """Z (2 n, f): the directions in which coordinates are free."""
         return self._solved[1]
 
     def rows(self) -> Iterator[Row]:
-        """The equations C X = d."""
+        """The linear equations C X = d that joints and motions impose on the coordinates."""
         yield from self._driven()
         for joint in self.case.joints:
             for vector in self.joint_vectors(joint):
@@ -117,7 +117,7 @@ class System:
         yield from self._floating()
 
     def joint_vectors(self, joint: Joint) -> list[Floats]:
-        """(2 n,) each: the components of X that a joint keeps as they are at the start."""
+        """(2 n,) each: the components of the coordinates X that a joint keeps as they are at the start."""
         first, second = joint.bodies
         between = self.at(second) - self.at(first)
         if joint.slide is not None:
@@ -153,11 +153,11 @@ class System:
         return total
 
     def loads(self, body: str) -> list[Load]:
-        """Those on a body that can have a force."""
+        """The loads on a body that can be a force."""
         return [load for load in self.load_case.loads if load.body == body and any(_acts(part) for part in load.force)]
 
     def driven_axes(self, body: str) -> list[int]:
-        """Which of x (0) and y (1) are prescribed."""
+        """Which of the coordinates x (0) and y (1) of a body are prescribed."""
         motion = _motion(self.load_case, body)
         return [] if motion is None else [axis for axis, part in enumerate((motion.x, motion.y)) if part is not None]
 

@@ -39,7 +39,7 @@ ROOMY = 12
 
 @part
 def active_members(model, strength, fill):
-    """The model without the members that carry nothing, its strengths, and how many members are left.
+    """The model without the members whose alpha is zero, their strengths, and how many members are left.
 
     In: strength (3, M_padded), or (ROOMY, M_padded) with room behind, to which the members that carry are written;
     fill: whether to do that, else they are there already, from the same strengths. The model itself comes back where

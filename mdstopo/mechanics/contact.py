@@ -27,7 +27,8 @@ NEAR = 1e-12
 
 @inline
 def contact_pose(c, r):
-    """along, height, slide, rise at the relative pose r (POSE,) of edge and point."""
+    """Where a point lies against an edge, at relative pose r (POSE,): along it, its height, and the rates slide and
+    rise."""
     ax = r[2] * c[4] - r[3] * c[5]
     ay = r[3] * c[4] + r[2] * c[5]
     x = r[0] + ax - c[6]
@@ -70,7 +71,7 @@ def contact_force(c, height, rise, slide, mode):
 
 @inline
 def drag_by_slide(c, slide):
-    """e and e' of a friction T = -N e s against a sliding velocity s in space, |s| = slide; de = e' (s . ds).
+    """Friction as T = -N e s against the sliding velocity s in space: e and e', by |s| = slide; de = e' (s . ds).
 
     With x = slide / slip, e = mu / slip tanh(x) / x and e' = mu / slip^3 (d/dx tanh(x) / x) / x: even powers of x, so
     nothing is special where nothing slides. Near there they are summed as series.
@@ -92,7 +93,7 @@ def drag_by_slide(c, slide):
 
 @inline
 def contact_margin(c, height, rise, room, mode):
-    """How far the mode is from its end, in m, or the unclipped N by k + c."""
+    """How far the mode is from its end: a distance in m, or the normal force before it is cut off, divided by k + c."""
     if mode == ABOVE:
         return height
     if mode == BESIDE:
@@ -130,7 +131,7 @@ def _touching(c, depth, rise):
 
 @inline
 def contact_next(c, height, rise, second, room, mode):
-    """The mode that follows where this one's margin is negative.
+    """The mode that follows when the margin of this one is used up.
 
     c (CONTACT,): parameters of the contact.
     height (m): of the point above the edge.
@@ -174,7 +175,7 @@ def contact_start(c, height, rise, second, room):
 
 @inline
 def contact_grazes(c, mode):
-    """What a margin that is only just used up (or not) does to derivatives, as `law_grazes` in
+    """How derivatives would change if the contact only just left its mode, as `law_grazes` in
     `mechanics.laws.law_table`.
 
     A damped touch that only just happens leaves no derivative of the motion: 2.

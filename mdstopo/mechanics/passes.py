@@ -65,19 +65,20 @@ WORTH = 400_000
 
 @part
 def springs_of(model):
-    """What `member_sums` needs of a model."""
+    """The arrays of a model that `member_sums` needs."""
     return Springs(model.block, model.member, model.chunk, model.threads, model.near)
 
 
 @kernel
 def threads_for(springs, poses):
-    """How many threads share a pass at so many poses."""
+    """How many threads share a pass over the members at so many poses."""
     return springs.threads if springs.threads > 0 and springs.member.shape[1] * poses >= WORTH else 1
 
 
 @part
 def scale_members(model, alpha, strength):
-    """strength (3 or more, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12).
+    """Strengths of the members (Eq. 12): strength (3 or more, M_padded) = alpha^mu times stiffness, damping and
+    preload.
 
     Rows 1 and 2 of design springs that have neither damping nor preload are left as they are: zero.
     """
@@ -378,7 +379,7 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):
 
 @part
 def energy_gradient(model, point, weight, out):
-    """out (M_padded,) += sum_e weight_e V_i(q_e) alone: the explicit part of the energy's design gradient."""
+    """Add the explicit part of the energy's design gradient alone: out (M_padded,) += sum_e weight_e V_i(q_e)."""
     n = model.q0.shape[0]
     pose = np.empty((0, model.pair.shape[0], POSE))
     none = np.empty(0, np.int64)
@@ -461,7 +462,7 @@ def design_of_members(k, start, stop, block, near, member, rel, u, weight, out):
 
 @part
 def unscale_gradient(model, alpha, padded, out):
-    """out (N,) = mu alpha^(mu - 1) times the padded gradient with respect to alpha^mu."""
+    """The gradient by alpha from that by alpha^mu: out (N,) = mu alpha^(mu - 1) times the padded gradient."""
     counter = np.zeros(1, np.int64)
     job = (counter, model.chunk, model.block, model.power, alpha, padded, out)
     shared(_unscale_chunks, threads_for(model, np.int64(1)), job)

@@ -51,7 +51,7 @@ class Approximation:
         return self.values + _sided(self.slopes, falling, rising)
 
     def convex(self, x: Floats) -> float:
-        """The convex term at x."""
+        """The value of the convex term at x."""
         step = x - self.x
         return 0.5 * float(np.einsum("i,i,i->", self.kappa, step, step))
 

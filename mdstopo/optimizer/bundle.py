@@ -45,7 +45,7 @@ class Bundle:
 
     @classmethod
     def empty(cls, n: int) -> "Bundle":
-        """No rows, of n variables."""
+        """A bundle without rows, of n variables."""
         none, ints = np.zeros((0, n)), np.zeros(0, dtype=np.int64)
         floats, truths = np.zeros(0), np.zeros(0, dtype=np.bool_)
         return cls(np.zeros((0, 2)), none, np.zeros((0, 0)), floats, ints, truths, ints, floats)
@@ -85,11 +85,11 @@ class Bundle:
 
     @property
     def norm(self) -> Bools:
-        """Which rows are norms, (K,)."""
+        """(K,) which rows are norms of vectors."""
         return ~np.isnan(self.offset)
 
     def vectors_at(self, d: Floats) -> Floats:
-        """The vectors (K, 2) after a step d (N,)."""
+        """(K, 2) the vectors of the rows after a step d (N,)."""
         out = self.vector.copy()
         out[:, 0] += self.slope @ d
         if self.across.shape[1]:
@@ -97,11 +97,11 @@ class Bundle:
         return out
 
     def values_at(self, d: Floats) -> Floats:
-        """The rows' values (K,) after a step d (N,)."""
+        """(K,) values of the rows after a step d (N,)."""
         return _values(self.vectors_at(d), self.offset)
 
     def values(self) -> Floats:
-        """The rows' values (K,) at the iterate."""
+        """(K,) values of the rows at the iterate."""
         return _values(self.vector, self.offset)
 
     def slopes_at(self, d: Floats) -> Floats:
@@ -121,13 +121,15 @@ class Bundle:
         return largest_of_groups(self.values(), self.group, groups)
 
     def moved(self, d: Floats, length: float) -> "Bundle":
-        """The same rows seen from another iterate, d (N,) away, `way` in ranges (2-norm); none is marked as its own."""
+        """The rows seen from another iterate, d (N,) away; `length`: how far that is, in ranges. None of them is the
+        iterate's own any more."""
         return self._with(
             vector=self.vectors_at(d), own=np.zeros(len(self), dtype=np.bool_), distance=self.distance + length
         )
 
     def lowered(self, levels: Floats, concavity: Floats) -> "Bundle":
-        """No row above levels (groups,), those from elsewhere below them by concavity (groups,) x distance squared."""
+        """The rows with values of at most levels (groups,); those found elsewhere lower still, by concavity (groups,)
+        times distance squared."""
         caps = levels[self.group] - np.where(self.own, 0.0, concavity[self.group] * self.distance**2)
         beyond = np.maximum(self.values() - caps, 0.0)
         vector = self.vector.copy()
@@ -135,11 +137,11 @@ class Bundle:
         return self._with(vector=vector, offset=self.offset + beyond)
 
     def subset(self, places: Ints | Bools) -> "Bundle":
-        """Some of the rows."""
+        """A bundle of some of the rows."""
         return Bundle(*(getattr(self, f.name)[places] for f in fields(Bundle)))
 
     def joined(self, other: "Bundle") -> "Bundle":
-        """These rows, then the others."""
+        """A bundle of these rows and others behind them."""
         width = max(self.across.shape[1], other.across.shape[1])
         wide = [np.zeros((len(b), width)) if b.across.shape[1] < width else b.across for b in (self, other)]
         columns = [np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(Bundle)
@@ -149,7 +151,7 @@ class Bundle:
         return Bundle(vector, slope, np.concatenate(wide), offset, group, own, age, distance)
 
     def without_repeats(self) -> "Bundle":
-        """The last one of rows that are the same within SAME."""
+        """The rows, and of those that are the same within SAME only the last one."""
         if len(self) < 2:
             return self
         steepest, values = self.steepest, self.values()
@@ -165,7 +167,8 @@ class Bundle:
         return self if kept.all() else self.subset(kept)
 
     def without_peaks_of(self, new: "Bundle") -> "Bundle":
-        """Those of these rows that are no peak of `new`, seen before: the group is the same, the slope nearly.
+        """The rows without those that are an earlier form of a peak of `new`: in the same group, with nearly the
+        same slope.
 
         Beside the curvature that a subproblem has, such a row would count the curvature of its peak once more, and
         steps would become ever shorter. Of very many variables all rows stay: they are few.
@@ -180,7 +183,7 @@ class Bundle:
         return self.subset(~seen.any(axis=1))
 
     def thinned(self) -> "Bundle":
-        """At most as many rows as there is room for: the iterate's own, those that were used last, the newest."""
+        """At most as many rows as may be kept: the iterate's own, those that were used last, the newest."""
         n = max(self.slope.shape[1], 1)
         most = LEAST if n >= WIDE else int(min(max(ROOM / n, LEAST), MOST))
         if len(self) <= most:

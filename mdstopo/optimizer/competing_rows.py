@@ -66,7 +66,7 @@ class FeasibleSet:
 
 
 class Around(Protocol):
-    """The subproblems around one iterate, in its box."""
+    """The subproblems in a box around one iterate."""
 
     def solve(self, rows: Bundle, penalty: Floats) -> Trial:
         """Solve the subproblem of these rows, where violations of the constraints cost penalty (J,)."""
@@ -78,7 +78,7 @@ class Around(Protocol):
         """By how much rows can change in the box, at most, (K,)."""
 
     def flat(self, curvature: float) -> "Around":
-        """The same subproblems with one curvature for all variables, in ranges, in place of what was learnt."""
+        """The same subproblems with one curvature for all variables, in ranges, in the place of the learnt one."""
 
 
 class RowModel(Protocol):
@@ -107,7 +107,7 @@ class DenseModel:
         self.space = space
 
     def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
-        """The subproblems at x, as of `RowModel`."""
+        """The subproblems in a box around x; see `RowModel.around`."""
         assert isinstance(steps, np.ndarray)
         assert isinstance(changes, np.ndarray)
         space = self.space
@@ -116,7 +116,7 @@ class DenseModel:
         return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range))
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
-        """The projected KKT residual, as of `RowModel`."""
+        """The projected KKT residual at x; see `RowModel.residual`."""
         return residual(own, x, self.space, penalty, steepest)
 
     def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:

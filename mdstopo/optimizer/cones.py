@@ -16,7 +16,8 @@ TINY = 1e-30
 
 
 class Scaling(NamedTuple):
-    """W of K cones: w (K, 3) and eta (K,), of which W is made; lam (K, 3).
+    """The Nesterov-Todd scaling W of K cones: w (K, 3) and eta (K,), of which W is made; lam (K, 3), the scaled
+    variables.
 
     W is symmetric. Its eigenvectors are the rows of turn (K, 3, 3), with the squares of its eigenvalues (K, 3): in
     their basis the linear systems have a diagonal where W^2 has entries of which one would drown the others.
@@ -78,7 +79,7 @@ def scaling_of(s: Floats, y: Floats) -> Scaling:
 
 @member_kernel
 def times(w: Floats, eta: float, x: Floats, out: Floats) -> None:
-    """out (3,) = W x of one cone."""
+    """Multiply by the scaling of one cone: out (3,) = W x."""
     inner = w[1] * x[1] + w[2] * x[2]
     share = x[0] + inner / (1.0 + w[0])
     out[0] = eta * (w[0] * x[0] + inner)
@@ -88,7 +89,7 @@ def times(w: Floats, eta: float, x: Floats, out: Floats) -> None:
 
 @member_kernel
 def inverse_times(w: Floats, eta: float, x: Floats, out: Floats) -> None:
-    """out (3,) = W^-1 x of one cone."""
+    """Multiply by the inverse of one cone's scaling: out (3,) = W^-1 x."""
     inner = w[1] * x[1] + w[2] * x[2]
     share = inner / (1.0 + w[0]) - x[0]
     out[0] = (w[0] * x[0] - inner) / eta
@@ -98,7 +99,7 @@ def inverse_times(w: Floats, eta: float, x: Floats, out: Floats) -> None:
 
 @member_kernel
 def longest(scaling: Scaling, ds: Floats, dy: Floats) -> float:
-    """The step to the boundary for changes (K, 3); found in the scaled space, where s and y are far from it."""
+    """The longest step within the cones for changes (K, 3) of slacks and multipliers, found in the scaled space."""
     most = np.inf
     change = np.empty(3)
     for k in range(len(ds)):
@@ -126,7 +127,8 @@ def to_boundary(x: Floats, d: Floats) -> float:
 
 @member_kernel
 def aim(scaling: Scaling, target: float, ds: Floats, dy: Floats, corrected: bool, out: Floats) -> None:
-    """What the products of cones are to change by: out = W (lam \\ (target e - lam o lam - (W^-1 ds) o (W dy))).
+    """The right side of a Newton step, by how much the products of cones have to change: out = W (lam \\ (target e -
+    lam o lam - (W^-1 ds) o (W dy))).
 
     o is the cone's product, and lam \\ x solves lam o y = x.
 

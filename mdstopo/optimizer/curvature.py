@@ -23,7 +23,7 @@ FAR_TOO_LARGE = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Curvature:
-    """B = diag(diagonal) + factor diag(weight) factor', or `matrix` where that is given.
+    """A matrix B = diag(diagonal) + factor diag(weight) factor', or `matrix` where that is given.
 
     diagonal (N,); factor (N, m); weight (m,), none 0; matrix (N, N) or None.
     """
@@ -35,17 +35,17 @@ class Curvature:
 
     @classmethod
     def diagonal_of(cls, diagonal: Floats) -> "Curvature":
-        """A diagonal (N,) alone."""
+        """A matrix with this diagonal (N,) and nothing beside it."""
         return cls(diagonal, np.zeros((len(diagonal), 0)), np.zeros(0))
 
     def times(self, x: Floats) -> Floats:
-        """B x, (N,)."""
+        """The product B x (N,)."""
         if self.matrix is not None:
             return np.asarray(self.matrix @ x)
         return np.asarray(self.diagonal * x + self.factor @ (self.weight * (self.factor.T @ x)))
 
     def dense(self) -> Floats:
-        """B, (N, N)."""
+        """The matrix B (N, N), with all its entries."""
         if self.matrix is not None:
             return self.matrix
         return np.asarray(np.diag(self.diagonal) + (self.factor * self.weight) @ self.factor.T)

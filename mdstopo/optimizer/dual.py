@@ -80,7 +80,7 @@ def solve_dual(model: Approximation, lower: Floats, upper: Floats, linear: Linea
 
 
 def minimiser(model: Approximation, lower: Floats, upper: Floats, pressure: Floats) -> Floats:
-    """argmin over the box of the model's row plus pressure . x, (N,), without the convex term.
+    """(N,) the x in the box at which the model's row plus pressure . x is least, without the convex term.
 
     Where nothing pushes, x stays at the iterate.
     """

@@ -35,7 +35,7 @@ RETREAT = 0.5
 
 
 class Method(Protocol):
-    """What makes the steps of the driver, which copies the state before it lets a method change it."""
+    """The interface of a method that makes the optimiser's steps; it changes the state in place, which is a copy."""
 
     def begin(self, state: GsaoState) -> None:
         """Go on from the iterate, whatever another method knows."""

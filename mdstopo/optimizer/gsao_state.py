@@ -29,13 +29,13 @@ class Step:
     __hash__ = None  # type: ignore[assignment]  # arrays have none
 
     def array(self) -> Floats:
-        """The difference, (N,)."""
+        """The difference of the two designs (N,)."""
         return self.to - self.origin
 
 
 @dataclass(frozen=True, slots=True)
 class RowDetails:
-    """What a sample says of its rows beside values and gradients; see `problem.Sample`."""
+    """What a sample says of its rows beside values and gradients (`problem.Sample`)."""
 
     constraint_groups: Ints
     offset: Floats
@@ -45,7 +45,7 @@ class RowDetails:
 
     @classmethod
     def of(cls, sample: Sample) -> "RowDetails":
-        """The details of a sample's rows."""
+        """The details of the rows of a sample."""
         return cls(*(getattr(sample, f.name) for f in fields(cls)))
 
 
@@ -105,7 +105,7 @@ class GsaoState(State):
 
     @property
     def sample(self) -> Sample:
-        """The iterate's function values as a sample."""
+        """Values and derivatives of the functions at the iterate, as a sample."""
         return Sample(
             self.objective,
             self.rows,
@@ -129,7 +129,7 @@ class GsaoState(State):
 
     @property
     def is_restoring(self) -> bool:
-        """Whether the largest violation stands for the objective."""
+        """Whether steps lower the largest violation at present, instead of the objective."""
         return self.restoring
 
     def foreseen(self) -> float:
@@ -143,11 +143,12 @@ class GsaoState(State):
         return merit(self.objective, self.sample.constraint_levels, penalty) - self.predicted
 
     def slope(self) -> Floats:
-        """See `State.slope`."""
+        """dU/dalpha (N,) of the highest row at the iterate; see `State.slope`."""
         return self.gradients[0] if len(self.gradients) else np.zeros(len(self.alpha))
 
     def row_shares(self) -> tuple[Ints, Floats]:
-        """See `State.row_shares`: known of the bundle method's rows."""
+        """The shares of the rows that hold the iterate; see `State.row_shares`. Known of the bundle method's rows
+        alone."""
         if not self.uses_bundle or self.restoring or len(self.bundle) != len(self.multipliers):
             return np.zeros(0, dtype=np.int64), np.zeros(0)
         return self.bundle.group, self.multipliers * self.bundle.steepest

@@ -39,12 +39,12 @@ class Optimizer(Protocol):
 
 
 def make(problem: Problem, settings: Settings) -> Optimizer:
-    """The optimiser that the settings name."""
+    """The optimiser that the settings name, for a problem."""
     return cast(Optimizer, resolve_name(OPTIMIZERS[settings.optimizer].made_by)(problem, settings))
 
 
 def reopen(optimizer: Optimizer, state: State) -> State:
-    """The state under the present limits: a run that a moved limit or tolerance ended goes on."""
+    """A state under new limits or tolerances: a run that ended because of the old ones goes on."""
     state = state.copy()
     state.status, state.reason = optimizer.terminate(state)
     return state

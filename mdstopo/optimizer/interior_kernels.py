@@ -281,7 +281,7 @@ def correct(B: Floats, bounds: Floats, work: Floats, target: float, rhs: Floats)
 
 @member_kernel
 def move(bounds: Floats, work: Floats, primal: float, dual: float) -> None:
-    """Take the step, with its two lengths."""
+    """Move the distances from the bounds and their multipliers along the step, by the primal and the dual length."""
     wl, wu, zl, zu = bounds[0], bounds[1], bounds[2], bounds[3]
     d, dl, du = work[2], work[3], work[4]
     for i in range(len(d)):

@@ -74,7 +74,7 @@ def powers(t: Floats, exponent: float, out: Floats, room: Ints) -> None:
 
 @member_kernel
 def largest(x: Floats) -> float:
-    """max |x|, 0 of none; NaN where one is NaN."""
+    """The largest magnitude max |x|; 0 of none, NaN where one is NaN."""
     bits = x.view(np.int64)
     most = np.zeros(1, dtype=np.int64)
     found = np.int64(0)

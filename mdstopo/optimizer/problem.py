@@ -103,7 +103,7 @@ class Sample:
 
     @property
     def constraint_levels(self) -> Floats:
-        """The largest row of each constraint (J,)."""
+        """(J,) the value of each constraint: the largest of its rows."""
         return self.levels_of(self.constraint_rows)
 
     def levels_of(self, rows: Floats) -> Floats:

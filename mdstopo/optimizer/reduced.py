@@ -37,7 +37,7 @@ class Curved(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """G (R, N); the level (R,) and the entry (R,) of C; S (R,)."""
+    """Rows of the program: G (R, N); the level (R,) and the entry (R,) of C; S (R,)."""
 
     G: Floats
     level: Ints
@@ -61,7 +61,7 @@ class Factored(NamedTuple):
 
 @member_kernel
 def times(P: Curved, x: Floats, out: Floats) -> None:
-    """out (N,) = P x."""
+    """The product of the matrix P with a vector: out (N,) = P x."""
     if len(P.matrix):
         for i in range(len(x)):
             out[i] = dot(P.matrix[i], x)
@@ -81,7 +81,7 @@ def by_variables(variables: int, others: int) -> bool:
 
 @member_kernel
 def factor(P: Curved, D: Floats, rows: Rows, A: Floats, L: Floats, E: Floats) -> tuple[Factored, bool]:
-    """The system, and whether it can be solved.
+    """Factorise the reduced system of an interior-point step; and whether it can be solved.
 
     P, D (N,), A (m, N), L (m,), E (J,): what it is made of, with the letters of the module's equations.
     rows: G, C and S of these.

@@ -97,7 +97,7 @@ def cuts_from(state: GsaoState, trial: Floats, objective: float) -> tuple[Floats
 
 
 def no_cuts(n: int) -> tuple[Floats, Floats]:
-    """No cuts, of n variables."""
+    """No cutting planes, of n variables."""
     return np.zeros(0), np.zeros((0, n))
 
 
@@ -113,7 +113,8 @@ def next_merit_penalty(merit_penalty: Floats, multipliers: Floats, penalty: Floa
 
 
 def first_penalty(sample: Sample, settings: Settings) -> Floats:
-    """The penalty of each constraint, (J,): its gradient then weighs `elastic` times as much as the objective's."""
+    """(J,) the first penalty of each constraint: its gradient then weighs `elastic` times as much as the
+    objective's."""
     if not len(sample.constraint_rows):
         return np.zeros(0)
     limits = sample.levels_of(steepest(sample.constraint_gradients))

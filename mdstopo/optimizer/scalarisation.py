@@ -43,7 +43,7 @@ class NotPositiveError(ValueError):
 
 @dataclass(frozen=True)
 class Scalarisation:
-    """One U of m objectives.
+    """One number U of m objectives: which formula, with which weights, utopia and maxima.
 
     method: name of a record. weights (m,): those of weight 0 take no part, unless the formula says that all do. lowest,
     highest (m,): utopia and maxima of Eq. 24, of signed values; None: raw values. exponent: p. anchor, normal (m,): a
@@ -74,7 +74,7 @@ class Scalarisation:
         return (values - self.lowest[i]) / width, 1.0 / width
 
     def transformed_all(self, signed: Floats) -> Floats:
-        """g (K, m) of values (K, m) of all objectives."""
+        """(K, m) the objectives g of Eq. 24, of values (K, m)."""
         if self.lowest is None or self.highest is None:
             return signed
         return np.asarray((signed - self.lowest) / (self.highest - self.lowest))
@@ -122,7 +122,7 @@ class Scalarisation:
 
 
 class Formula(ABC):
-    """How U follows from the objectives: what a record's `made_by` names. It keeps nothing.
+    """The formula by which U follows from the objectives; a record's `made_by` names it, and it has no state.
 
     all_take_part: whether objectives of weight 0 do, too.
     """
@@ -131,14 +131,15 @@ class Formula(ABC):
 
     @abstractmethod
     def values(self, one: Scalarisation, signed: Floats) -> Floats:
-        """See `Scalarisation.values`."""
+        """(K,) U of designs with values (K, m); see `Scalarisation.values`."""
 
     @abstractmethod
     def rows(self, one: Scalarisation, parts: Sequence[Part]) -> tuple[Floats, Floats]:
-        """See `Scalarisation.rows`; in any order."""
+        """Smooth rows whose maximum is U, in any order; see `Scalarisation.rows`."""
 
     def spread(self, one: Scalarisation, table: Floats) -> Scalarisation:
-        """Of a way that spreads the points of a front: the one with its `normal` or `planes`, too.
+        """For a front: the scalarisation with its `normal` or `planes`, from the ends of the front; of formulas that
+        spread points alone.
 
         table (m, m): a row for each end of the front, its objectives scaled by Eq. 24.
         """
@@ -149,12 +150,12 @@ class SumOfPowers(Formula):
     """U = sum_i w_i sign(g_i) |g_i|^p, and whatever else is a sum over objectives: one row for each choice of peaks."""
 
     def values(self, one: Scalarisation, signed: Floats) -> Floats:
-        """See `Scalarisation.values`."""
+        """(K,) U of designs with values (K, m); see `Scalarisation.values`."""
         g, p = one.transformed_all(signed)[:, one.active], self.power(one)
         return np.asarray((one.weights[one.active] * np.sign(g) * np.abs(g) ** p).sum(axis=1))
 
     def rows(self, one: Scalarisation, parts: Sequence[Part]) -> tuple[Floats, Floats]:
-        """See `Scalarisation.rows`."""
+        """One row for each choice of a peak of every objective, with gradients; see `Scalarisation.rows`."""
         terms = [self.term(one, i, values, k) for k, (i, (values, _)) in enumerate(zip(one.active, parts, strict=True))]
         rows, gradients = [], []
         wanted = all(len(part[1]) for part in parts)
@@ -167,7 +168,7 @@ class SumOfPowers(Formula):
         return np.array(rows), np.array(gradients) if wanted else np.zeros((0, 0))
 
     def power(self, one: Scalarisation) -> float:
-        """p."""
+        """The exponent of the objectives: p of the case."""
         return one.exponent
 
     def term(self, one: Scalarisation, i: int, values: Floats, place: int) -> tuple[Floats, Floats]:
@@ -181,15 +182,15 @@ class SumOfPowers(Formula):
         return weight * np.sign(g) * size**p, weight * slope * factor
 
     def total(self, added: float) -> tuple[float, float]:
-        """U of a sum, and its slope."""
+        """U from the sum over the objectives, and its slope by that."""
         return added, 1.0
 
 
 class Sum(SumOfPowers):
-    """U = sum_i w_i g_i."""
+    """The weighted sum, U = sum_i w_i g_i."""
 
     def power(self, one: Scalarisation) -> float:
-        """p = 1."""
+        """The exponent of the objectives: 1."""
         return 1.0
 
 
@@ -197,7 +198,7 @@ class Product(SumOfPowers):
     """U = prod_i G_i^w_i: the exponential of a sum of logarithms, of raw values."""
 
     def values(self, one: Scalarisation, signed: Floats) -> Floats:
-        """See `Scalarisation.values`."""
+        """(K,) U of designs with values (K, m); see `Scalarisation.values`."""
         raw = signed[:, one.active]
         with np.errstate(invalid="ignore", divide="ignore"):
             logs = np.log(np.where(raw > 0.0, raw, np.nan))
@@ -211,7 +212,7 @@ class Product(SumOfPowers):
         return weight * np.log(values), weight / values
 
     def total(self, added: float) -> tuple[float, float]:
-        """The exponential, which is its own slope."""
+        """U from the sum of logarithms: its exponential, which is its own slope."""
         total = float(np.exp(added))
         return total, total
 
@@ -220,12 +221,12 @@ class Largest(Formula):
     """U = max_i w_i g_i, and whatever else is the largest of s_i g_i + c_i: one row a peak."""
 
     def values(self, one: Scalarisation, signed: Floats) -> Floats:
-        """See `Scalarisation.values`."""
+        """(K,) U of designs with values (K, m); see `Scalarisation.values`."""
         g = one.transformed_all(signed)[:, one.active]
         return np.asarray((one.weights[one.active] * g).max(axis=1))
 
     def rows(self, one: Scalarisation, parts: Sequence[Part]) -> tuple[Floats, Floats]:
-        """See `Scalarisation.rows`."""
+        """One row for each peak of every objective, with gradients; see `Scalarisation.rows`."""
         rows, gradients = [], []
         for i, (values, slopes) in zip(one.active, parts, strict=True):
             line = self.line(one, i)
@@ -242,20 +243,20 @@ class Largest(Formula):
 
 
 class BoundaryIntersection(Largest):
-    """U = 1 + max_i (g_i - a_i) / r_i."""
+    """Normal boundary intersection: U = 1 + max_i (g_i - a_i) / r_i."""
 
     all_take_part = True
 
     def values(self, one: Scalarisation, signed: Floats) -> Floats:
-        """See `Scalarisation.values`."""
+        """(K,) U of designs with values (K, m); see `Scalarisation.values`."""
         return np.asarray((1.0 + (one.transformed_all(signed) - one.anchor) / one.normal).max(axis=1))
 
     def line(self, one: Scalarisation, i: int) -> tuple[float, float] | None:
-        """1/r and 1 - a/r."""
+        """Slope 1/r and offset 1 - a/r of the line that an objective is in U."""
         return 1.0 / float(one.normal[i]), 1.0 - float(one.anchor[i]) / float(one.normal[i])
 
     def spread(self, one: Scalarisation, table: Floats) -> Scalarisation:
-        """r is 1: all objectives give way alike, in units of Eq. 24."""
+        """The scalarisation with all entries of r equal to 1: objectives give way alike, in units of Eq. 24."""
         return replace(one, normal=np.ones(len(table)))
 
 
@@ -265,15 +266,15 @@ class NormalConstraint(Largest):
     all_take_part = True
 
     def values(self, one: Scalarisation, signed: Floats) -> Floats:
-        """See `Scalarisation.values`."""
+        """(K,) U of designs with values (K, m); see `Scalarisation.values`."""
         return np.asarray(one.transformed_all(signed)[:, -1])
 
     def line(self, one: Scalarisation, i: int) -> tuple[float, float] | None:
-        """1 and 0 of the last objective."""
+        """Slope 1 and offset 0: U is the last objective."""
         return (1.0, 0.0) if i == len(one.weights) - 1 else None
 
     def spread(self, one: Scalarisation, table: Floats) -> Scalarisation:
-        """Planes through the anchor whose normals lead from the other ends to the last one."""
+        """The scalarisation with planes through the anchor, whose normals lead from the other ends to the last one."""
         return replace(one, planes=table[-1] - table[:-1])
 
 

@@ -6,7 +6,7 @@ from mdstopo.optimizer.problem import Floats, Ints
 
 
 class Shifts:
-    """Distances of the shifts (N,), in ranges; never changed, as seen from outside.
+    """Distances of the shifts (N,), in ranges; seen from outside they never change.
 
     Most variables rest on a bound, and their shifts stay; to copy all for the others would take longer than to find
     the others. So `following` changes the array itself and notes what was there before; who still asks this object for

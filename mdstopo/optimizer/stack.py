@@ -29,7 +29,7 @@ class Stack:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(K, N)."""
+        """The shape (K, N) of all its rows together."""
         return len(self.rows), self.n
 
     def __len__(self) -> int:
@@ -58,7 +58,7 @@ def slopes_of(matrix: Slopes) -> Slopes:
 
 
 def joined(one: Slopes, other: Slopes) -> Slopes:
-    """The rows of one, then those of the other."""
+    """The rows of one matrix, then those of the other."""
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         return np.concatenate([one, other])
     first, last = (each if isinstance(each, Stack) else Stack.of(each) for each in (one, other))

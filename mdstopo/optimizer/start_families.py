@@ -20,7 +20,7 @@ SPARSE, EXCHANGED = 0.1, 0.15
 
 
 class Family(enum.StrEnum):
-    """Where a start begins."""
+    """The ways to choose the design with which a start begins."""
 
     STATED = "the stated design"
     SOFTENED = "the stated design, optimised with a quarter of the strengths"
@@ -83,19 +83,20 @@ def random_feasible(problem: Problem, seed: int, index: int) -> Floats:
 
 
 def sparse(problem: Problem, seed: int, index: int) -> Floats:
-    """A few whole members and no others, projected on the linear rows; parameters of laws uniform."""
+    """The design of a start with a few whole members and no others, projected on the linear rows; parameters of laws
+    uniform."""
     drawn = np.random.default_rng([seed, index]).uniform(size=len(problem.lower))
     return _feasible(problem, (drawn < SPARSE).astype(np.float64), drawn)
 
 
 def uniform(problem: Problem, seed: int, index: int) -> Floats:
-    """Uniform shares of the ranges, projected on the linear rows."""
+    """The design of a start with uniform random shares of the ranges, projected on the linear rows."""
     drawn = np.random.default_rng([seed, index]).uniform(size=len(problem.lower))
     return _feasible(problem, drawn, drawn)
 
 
 def neighbour(problem: Problem, seed: int, index: int, best: Floats) -> Floats:
-    """The best design with some of its values exchanged, projected on the linear rows."""
+    """The design of a start that is the best one with some of its values exchanged, projected on the linear rows."""
     rng = np.random.default_rng([seed, index])
     out = best.copy()
     some = np.flatnonzero(rng.uniform(size=len(out)) < EXCHANGED)
@@ -133,7 +134,8 @@ def best_run(runs: Sequence[State | None], tolerance: float) -> int:
 
 
 def rank(run: State | None, tolerance: float) -> tuple[bool, float, float]:
-    """What runs are ordered by, the best first: whether infeasible, by how much, the objective; inf of a failed run."""
+    """The key by which runs are ordered, the best first: whether infeasible, by how much, the objective; inf of a
+    failed run."""
     if run is None or not np.isfinite(run.best_objective):
         return True, float("inf"), float("inf")
     infeasible = run.best_violation > tolerance

@@ -95,7 +95,7 @@ class History:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Array]) -> "History":
-        """The inverse of `to_arrays`."""
+        """The history from arrays that `to_arrays` has made."""
         out = cls()
         for name, column in arrays.items():
             head, _, key = name.partition("/")
@@ -153,7 +153,7 @@ class State:
 
     @property
     def running(self) -> bool:
-        """Whether another iteration is due."""
+        """Whether the optimiser is to do another iteration."""
         return self.status is RunStatus.RUNNING
 
     # What an optimiser may tell of its own part; the defaults tell nothing.

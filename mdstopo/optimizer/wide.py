@@ -50,7 +50,7 @@ class Proposal(NamedTuple):
 
 
 class Space(NamedTuple):
-    """Where designs are: bounds (N,), volume rows, and the ranges (N,); all but `linear` are `short`."""
+    """The designs that are allowed: bounds (N,), volume rows, and the ranges (N,); all but `linear` are `short`."""
 
     lower: Floats
     upper: Floats
@@ -72,12 +72,13 @@ def ranges(lower: Floats, upper: Floats) -> Floats:
 
 
 def short(x: Floats) -> Floats:
-    """The array, or a piece of it where it is long and all its numbers are alike."""
+    """The first piece of a long array whose numbers are all alike, which stands for the whole; any other array as it
+    is."""
     return x[:PIECE] if len(x) >= WIDE and bool((x == x[0]).all()) else x
 
 
 class Kept(Generic[T]):
-    """A function of arrays that does not compute its last two results again; arrays are never changed in place."""
+    """A function of arrays that keeps its last two results; arrays are never changed in place."""
 
     def __init__(self, function: Callable[..., T]) -> None:
         self._function = function
@@ -93,12 +94,12 @@ class Kept(Generic[T]):
         return result
 
     def tell(self, result: T, *arrays: Floats) -> None:
-        """What the function gives for these arrays is known."""
+        """Note the result of the function for these arrays, which is known already."""
         self._kept = [(arrays, result), *self._kept[:1]]
 
 
 class Room:
-    """Memory for `wide_minimum`, kept from one step to the next: to be given new pages takes longer than to fill them.
+    """Arrays for `wide_minimum`, kept from one step to the next: new memory takes longer to get than to fill.
 
     slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,). made: the step of which found and counts tell who
     may have moved, or None. signs: two of (N/32,), because `wide_shift_few` reads the last step's while it writes this
@@ -111,7 +112,7 @@ class Room:
         self.signed: Step | None = None
 
     def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats]:
-        """Room for n variables; what it holds is of no account but for what is said above."""
+        """The arrays for n variables."""
         if n != self._n:
             self._n, self.made, self.signed = n, None, None
             self._who = _thin(n), np.empty((2, -(-n // PIECE)), dtype=np.int64)
@@ -121,7 +122,7 @@ class Room:
         return slots, place, found, counts, x
 
     def used(self, count: int) -> None:
-        """So many slots were: where that is much memory it is let go of."""
+        """Note how many slots were used; where that is much memory it is freed."""
         if self._n >= LIGHT and count > self._n // MUCH:
             self._take()
 
@@ -136,7 +137,7 @@ def _thin(n: int) -> Ints:
 
 
 class Measures:
-    """Numbers of designs and gradients that are kept, because several steps need them: change, excess, steepest."""
+    """Numbers of designs and gradients that several steps need and that are kept: change, excess, steepest."""
 
     def __init__(self, space: Space) -> None:
         self.space = space
@@ -146,7 +147,7 @@ class Measures:
         self.room = Room()
 
     def look(self, gradients: Floats, x: Floats) -> None:
-        """Find `steepest` of the gradients (R, N) and `excess` of x at once, where one pass can."""
+        """Compute `steepest` of the gradients (R, N) and `excess` of x, in one pass where that is possible."""
         rows = self.space.rows
         if len(x) >= WIDE and gradients.shape == (1, len(x)) and gradients.flags.c_contiguous and len(rows) == 1:
             most, total = wide_steepest_and_sum(gradients[0], rows[0], x, threads_for(len(x), LIGHT))
@@ -266,7 +267,7 @@ def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room
 
 
 def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
-    """max |x - y|, and the largest in its unit."""
+    """The largest change max |x - y|, and the largest in units of each variable."""
     if len(x) >= WIDE:
         plain, scaled = wide_change(x, y, unit, threads_for(len(x), LIGHT))
         return plain, scaled
@@ -275,7 +276,7 @@ def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
 
 
 def excess(space: Space, x: Floats) -> Floats:
-    """A x - b, (m,)."""
+    """By how much a design exceeds the bounds of the linear rows: A x - b (m,)."""
     if len(x) < WIDE:
         return space.linear.excess(x)
     return np.array([total(row, x) for row in space.rows]) - space.linear.b

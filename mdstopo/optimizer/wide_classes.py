@@ -80,7 +80,8 @@ def sort(
     pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
     limits: Floats, threads: int, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
 ) -> None:  # fmt: skip
-    """Say of each variable whether multipliers send it to an end of its box or into it, or leave that in doubt.
+    """Decide for each variable whether given multipliers move it to an end of its box or inside; in doubt where they
+    are too uncertain.
 
     Constant:
       pool (S, N): all rows.
@@ -198,7 +199,8 @@ def finish(
     pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats, limits: Floats,
     threads: int, classes: Bools, trial: Floats, found: Ints, counts: Ints, sums: Floats,
 ) -> float:  # fmt: skip
-    """Move all variables to where the final multipliers send them, and find those that do not do what was assumed.
+    """Move all variables to where the final multipliers have them, and find those that contradict what was assumed
+    of them.
 
     Constant:
       pool (S, N): all rows.
@@ -408,7 +410,7 @@ def _grams(counter: Ints, pool: Floats, rows: Ints, unit: Floats, products: Floa
 
 @vector_entry
 def combined(pool: Floats, rows: Ints, theta: Floats, threads: int, out: Floats) -> None:
-    """out = sum_k theta_k Q_k."""
+    """A sum of rows with weights: out = sum_k theta_k Q_k."""
     counter = np.zeros(1, np.int64)
     shared(_combined, threads, (counter, pool, rows, theta, out))
 

@@ -46,7 +46,7 @@ def total(a: Floats, x: Floats) -> float:
 
 
 def stride(n: int, sample: int) -> int:
-    """The distance of the variables that a sample of about so many of n takes.
+    """The step between the variables of a sample of about `sample` out of n.
 
     It has no common factor with n, so that the sample does not keep step with rows of a grid.
     """

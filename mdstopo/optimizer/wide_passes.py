@@ -21,13 +21,13 @@ SOON = 32
 
 @kernel
 def pieces(n: int) -> int:
-    """How many pieces n variables are."""
+    """Into how many pieces n variables are divided."""
     return (n + PIECE - 1) // PIECE
 
 
 @member_kernel
 def part(x: Floats, n: int, start: int, stop: int) -> Floats:
-    """x[start:stop] of an array of n, or of one whose numbers are alike."""
+    """The part x[start:stop] of an array of n numbers, or of a shorter one whose numbers are all alike."""
     return x[start:stop] if len(x) == n else x[: stop - start]
 
 
@@ -122,7 +122,7 @@ def wide_shift_few(
 
 @vector_entry
 def wide_change(x: Floats, y: Floats, unit: Floats, threads: int) -> tuple[float, float]:
-    """max |x - y|, and the largest in its unit."""
+    """The largest change max |x - y|, and the largest in units of each variable, on several threads."""
     plain, scaled = np.zeros(pieces(len(x))), np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_changes, threads, (counter, x, y, unit, plain, scaled))
@@ -157,7 +157,7 @@ def _changes(counter: Ints, x: Floats, y: Floats, unit: Floats, plain: Floats, s
 
 @vector_entry
 def wide_largest(x: Floats, threads: int) -> float:
-    """max |x|; NaN where one is NaN."""
+    """The largest magnitude max |x|, on several threads; NaN where one is NaN."""
     most = np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_sizes, threads, (counter, x, most))
@@ -174,7 +174,7 @@ def _sizes(counter: Ints, x: Floats, out: Floats) -> None:
 
 @vector_entry
 def wide_sum(a: Floats, x: Floats, threads: int) -> float:
-    """sum of a x, the same to the bit as `wide_steepest_and_sum` finds it."""
+    """The sum of a x, the same to the bit as `wide_steepest_and_sum` finds it."""
     sums = np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_sums, threads, (counter, a, x, sums))
@@ -192,7 +192,7 @@ def _sums(counter: Ints, a: Floats, x: Floats, out: Floats) -> None:
 
 @vector_entry
 def wide_steepest_and_sum(gradient: Floats, a: Floats, x: Floats, threads: int) -> tuple[float, float]:
-    """max |gradient|, NaN where one is NaN, and the sum of a x."""
+    """The largest magnitude of a gradient, NaN where one is NaN, and the sum of a x, in one pass."""
     most, sums = np.zeros(pieces(len(x))), np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_steepest_and_sums, threads, (counter, gradient, a, x, most, sums))

@@ -59,8 +59,8 @@ WEIGHTLESS = 1e20
 
 
 class Region(NamedTuple):
-    """Where the step may end: x (N,), bounds and ranges (N,) or a few of them where all are alike, and `limits` of
-    `wide_classes` but the doubt."""
+    """The designs that a step may reach: x (N,), bounds and ranges (N,) or a few of them where all are alike, and
+    `limits` of `wide_classes` but the doubt."""
 
     x: Floats
     lower: Floats
@@ -82,7 +82,7 @@ class Region(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Memory for one pass after another: classes (2, N), found (N,), counts (pieces,)."""
+    """Arrays for one pass after another: classes (2, N), found (N,), counts (pieces,)."""
 
     classes: Bools
     found: Ints
@@ -90,7 +90,7 @@ class Room(NamedTuple):
 
     @classmethod
     def of(cls, n: int) -> "Room":
-        """Memory for n variables."""
+        """The arrays for n variables."""
         pieces = -(-n // PIECE)
         return cls(np.zeros((2, n), dtype=np.bool_), np.zeros(n, dtype=np.int64), np.zeros(pieces, dtype=np.int64))
 
@@ -140,7 +140,7 @@ class WideProgram:
 
 
 class Few(NamedTuple):
-    """Some variables: which, their columns (R, n), ends and h (n,), how many variables each stands for."""
+    """Some of the variables: their numbers, columns (R, n), ends and h (n,), and how many variables each stands for."""
 
     which: Ints
     Q: Floats
@@ -162,7 +162,7 @@ class Few(NamedTuple):
 
 
 class Guess(NamedTuple):
-    """Multipliers theta (R,) that are nearly right; spread (R,), doubt: they are wrong by up to doubt times spread."""
+    """Multipliers theta (R,) that are nearly right: they are wrong by up to `doubt` times spread (R,)."""
 
     theta: Floats
     spread: Floats
@@ -174,7 +174,8 @@ class Guess(NamedTuple):
 
 
 class Found(NamedTuple):
-    """theta (R,); the steps (n,) of those in doubt; whether that is a solution."""
+    """What an iteration has found: multipliers theta (R,); the steps (n,) of variables in doubt; whether that is a
+    solution."""
 
     theta: Floats
     d: Floats

@@ -35,7 +35,7 @@ SPARSE = 64
 
 
 class Pool:
-    """Rows as one matrix, in which each stays where it is until its place is needed. rows (S, N)."""
+    """Rows (S, N) as one matrix, in which each stays in its place until that is needed for another."""
 
     def __init__(self, n: int) -> None:
         self.rows = np.empty((ROWS, n))
@@ -92,7 +92,7 @@ class WideModel:
         self.linear = [(np.ascontiguousarray(row), False) for row in space.linear.A]
 
     def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
-        """The subproblems at x, as of `RowModel`."""
+        """The subproblems in a box around x; see `RowModel.around`."""
         s, y = _stack(steps), _stack(changes)
         pairs = [*((row, True) for row in s.rows), *((row, False) for row in y.rows)]
         while pairs:
@@ -107,7 +107,7 @@ class WideModel:
         return _WideAround(self, x, reach, FLOOR * steepest, [], NOTHING, NOTHING, scaled=True)
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
-        """The projected KKT residual, as of `RowModel`."""
+        """The projected KKT residual at x; see `RowModel.residual`."""
         if steepest == 0.0:
             return 0.0
         anywhere = _WideAround(self, x, (np.inf, np.inf), steepest, [], NOTHING, NOTHING, scaled=False)

@@ -79,7 +79,7 @@ def enter_slot(
     slots: Floats, place: Ints, k: int, i: int, alpha: float, slope: float, cost: float, low: float, high: float,
     reach: float, kappa: float,
 ) -> None:  # fmt: skip
-    """Write a variable into a column of the slots.
+    """Copy a variable into a column of the slots, which hold the variables that are still undecided.
 
     In:
       k: the column.
@@ -383,7 +383,7 @@ def root(
 
 @member_kernel
 def settle(slots: Floats, n: int, x: Floats, goal: float, equal: bool, rounding: float) -> float:
-    """Take what is left of the sum's difference from the goal from the variables inside their boxes.
+    """Move the variables inside their boxes until the sum has its goal, as far as possible.
 
     In:
       slots (SLOTS, n): the variables; n: how many are used.
@@ -417,7 +417,7 @@ def settle(slots: Floats, n: int, x: Floats, goal: float, equal: bool, rounding:
 
 @member_kernel
 def promise(slots: Floats, n: int, x: Floats, power: float, room: Floats, whole: Ints) -> float:
-    """The change of the model over the variables in the slots.
+    """By how much the model changes over the variables in the slots; negative where it falls.
 
     In:
       slots (SLOTS, n): the variables; n: how many are used.

@@ -28,7 +28,7 @@ _ROOM = 9
 
 @inline
 def one(x: Floats, n: int, i: int) -> float:
-    """x[i] of an array of n, or of one whose numbers are alike."""
+    """The entry x[i] of an array of n numbers, or of a shorter one whose numbers are all alike."""
     return float(x[i if len(x) == n else 0])
 
 

@@ -49,7 +49,8 @@ TOLERATED = 1e-6
 
 @dataclass(frozen=True)
 class Starts:
-    """Where solves begin. first (N,): the case's design; count: of each solve, draw: makes the designs of the others.
+    """The designs with which solves begin: first (N,), the case's own; count: how many a solve has; draw: makes the
+    others.
 
     tolerance: of violations, where starts are compared. softens: whether there are members whose strengths vary.
     """
@@ -62,7 +63,7 @@ class Starts:
 
     @property
     def early(self) -> int:
-        """How many starts there are before those that begin at the best design of the others."""
+        """How many starts come before those that begin at the best design of the others."""
         return sum(not begins_at_best(family_of(index, self.count)) for index in range(self.count))
 
     def begin(self, task: Task, index: int, number: int, best: Floats | None = None) -> Task:
@@ -75,7 +76,8 @@ class Starts:
 
 @dataclass(frozen=True)
 class Request:
-    """A front: directions (W, m), weights or anchors; method; exponent p and whether to normalise (Eq. 24).
+    """The front that is asked for: directions (W, m), weights or anchors; method; exponent p and whether to
+    normalise (Eq. 24).
 
     signs (m,): -1 for what is to be maximised. starts: where solves begin; iterations: of each. active: the objectives
     that take part, by place; all where empty.
@@ -93,7 +95,8 @@ class Request:
 
 @dataclass(frozen=True)
 class Front:
-    """points: what was found for every direction, None where nothing was. ends: the best known of every objective.
+    """A front. points: what was found for every direction, None where nothing was. ends: the best known of every
+    objective.
 
     utopia, maxima (m,): raw values, which the points of the last rounds were found with. further: designs that were
     visited on the way to a point (`Found.point`) and belong to the front.
@@ -116,7 +119,7 @@ class NoEndError(Exception):
 
 
 class Planner:
-    """What has been found, and what follows from it."""
+    """Plans the solves of a front: keeps what has been found, and says which solves follow."""
 
     def __init__(self, request: Request) -> None:
         self.request = request
@@ -155,7 +158,7 @@ class Planner:
         return Front(points, tuple(self.ends), signs * self.lowest, signs * self.highest, further)
 
     def ends_alone(self) -> Part:
-        """The first rounds alone: each objective's optimum, and with it utopia and maxima."""
+        """Plan the first rounds alone: each objective's optimum, and with it utopia and maxima."""
         yield from self._ends()
 
     # the rounds

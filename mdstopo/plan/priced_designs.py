@@ -26,7 +26,7 @@ class _Part(NamedTuple):
 
 
 def packed(case: Case, alpha: Floats) -> Floats:
-    """The array of a design (N,) of the members that the case has; of priced groups those with alpha > 0."""
+    """A design (N,) of the members that the case has built, as one array; of priced groups those with alpha > 0."""
     pieces: list[Floats] = []
     for group in case.design_groups:
         own = alpha[case.group_slices[group.name]]
@@ -58,7 +58,7 @@ def with_all(case: Case, designs: Iterable[Floats]) -> Case:
 
 
 def in_case(built: Case, design: Floats) -> Floats:
-    """Alpha (N,) of a design whose members are among those that a case has."""
+    """(N,) the alpha of a design in a case that has all of the design's members, and perhaps more."""
     alpha = np.zeros(built.n_design)
     for part in _parts(built, design):
         own = alpha[built.group_slices[part.group.name]]

@@ -35,7 +35,7 @@ PENALTY, HIGHEST = 1e3, 1e12
 
 @dataclass(frozen=True)
 class Prices:
-    """What pricing has found at a design.
+    """The result of pricing candidates at one design.
 
     seen: candidates. best: the largest gain of one, together: how much all of them may gain, relative to the
     objective, to first order. pairs: those that are to enter, by group; gains: of these, the largest first; left: the
@@ -59,7 +59,7 @@ class Prices:
 
 @dataclass(frozen=True, slots=True)
 class Pricing:
-    """What the last round has found of candidates that are priced.
+    """The result of the last round of pricing.
 
     candidates: how many there are. rounds: so far. best: by how much one of them would lower the objective (or raise
     it, where it is maximised) with alpha at its upper bound, together: by how much all of them at most; relative to the
@@ -105,7 +105,7 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
 
 
 def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
-    """The prices at a design (N,) with the largest gain of one as it is where the best candidates are built.
+    """The prices at a design (N,), with the largest gain as it is once the best candidates are built.
 
     Members of laws that switch have steps end at their switches where they are built; prices know no such steps, and so
     differ a little. CONFIRMED of each group are built. Of all others the best one counts with its price and the largest

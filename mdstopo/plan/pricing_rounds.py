@@ -38,7 +38,7 @@ COARSE, FINER, LITTLE = 20_000, 32, 100.0
 
 
 def members_part(case: Case) -> Datasets:
-    """What a file keeps of the members that priced groups have."""
+    """The datasets that a file keeps of the members that priced groups have."""
     part: Datasets = {}
     for name, (i, j) in pairs_of(case).items():
         where = f"{CANDIDATES}/members/{name}"
@@ -47,7 +47,8 @@ def members_part(case: Case) -> Datasets:
 
 
 class Rounds:
-    """The rounds of a case so far. case: with the members that are built; design (N,): where the next round begins."""
+    """The rounds of pricing of a case. case: with the members that are built; design (N,): where the next round
+    begins."""
 
     def __init__(self, case: Case) -> None:
         self.case = case
@@ -60,7 +61,7 @@ class Rounds:
 
     @property
     def count(self) -> int:
-        """How many rounds have ended."""
+        """How many rounds of pricing have ended."""
         return len(self.rows)
 
     @property
@@ -72,7 +73,8 @@ class Rounds:
         return Pricing(self.candidates, self.count, best, together)
 
     def go_on(self, engine: Engine, problem: Problem, state: State) -> bool:
-        """Price all candidates at the end of a round; whether another follows, with those that enter.
+        """Price all candidates at the end of a round. Returns whether another round follows, with the candidates
+        that enter.
 
         engine, problem, state: of the case so far, of what was optimised, and where that has ended.
         """
@@ -171,7 +173,7 @@ class Rounds:
         self.case, self.design = with_members(self.case, pairs), np.concatenate(pieces)
 
     def part(self) -> Datasets:
-        """What a file keeps: the points of the members that are built, and the rounds."""
+        """The datasets that a file keeps: the points of the members that are built, and the rounds."""
         if not self.case.priced_groups:
             return {}
         part = members_part(self.case)
@@ -180,7 +182,7 @@ class Rounds:
         return part | {f"{CANDIDATES}/count": np.array(self.candidates)}
 
     def restore(self, view: ResultView) -> None:
-        """Take up the rounds of an earlier process."""
+        """Take up the rounds of pricing that an earlier process has saved."""
         try:
             columns = [np.asarray(view.array(f"{CANDIDATES}/rounds/{name}"), dtype=np.float64) for name in COLUMNS]
             begun = view.array("iterations/round")

@@ -20,7 +20,7 @@ Solved = list[tuple[Task, Found]]
 
 
 def in_contest(tasks: Sequence[Task]) -> list[Task]:
-    """Starts of one solve, as tasks that compete with each other."""
+    """The starts of one solve as tasks, of which the worse are dropped on the way."""
     if len(tasks) < 2:
         return list(tasks)
     digest = hashlib.blake2b(digest_size=16)

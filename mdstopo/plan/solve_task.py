@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Task:
-    """point: which point of the front it is for, or -1 - i for the optimum of objective i alone.
+    """One solve of a front. point: which point it is for, or -1 - i for the optimum of objective i alone.
 
     start (n,): the optimiser's x to begin with; softened: the optimum from there with less strong members is, in its
     place. iterations: at most so many. contest: the hash of the starts that it competes with, for who goes on depends
@@ -68,7 +68,7 @@ class Task:
         return digest.hexdigest()
 
     def is_through(self, state: State) -> bool:
-        """Whether a state is as far as this part of the task goes."""
+        """Whether a state has come as far as this part of the task goes."""
         return not state.running or (self.quota is not None and state.iteration >= self.quota)
 
 

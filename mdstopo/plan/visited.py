@@ -39,7 +39,7 @@ class Solve:
 
 
 class Visited:
-    """The designs that keep the limits and of which all values are known.
+    """The designs that a front's solves have evaluated, keep the limits, and have values of all objectives.
 
     table (V, m): their objectives, smaller is better; places: where each was met.
     """
@@ -50,7 +50,7 @@ class Visited:
         self.places: list[Place] = []
 
     def add(self, task: Task, found: Found, signs: Floats, tolerated: float) -> None:
-        """Take in what a solve has visited."""
+        """Add the designs that a solve has evaluated."""
         number = len(self.solves)
         self.solves.append(Solve(task, found))
         values = signs * found.visited
@@ -61,7 +61,7 @@ class Visited:
         self.places += [(number, row) for row in np.flatnonzero(good).tolist()]
 
     def on_the_way(self) -> NDArray[np.bool_]:
-        """(V,) which are no ends of solves."""
+        """(V,) which designs are no ends of solves, but were passed by one."""
         return np.array([self.solves[number].iterate(row) >= 0 for number, row in self.places], dtype=np.bool_)
 
 
@@ -74,7 +74,8 @@ def even_spacing(count: int, m: int) -> float:
 
 
 def belonging(points: Floats, table: Floats, lowest: Floats, highest: Floats, spacing: float) -> list[int]:
-    """The rows of `table` (V, m) that belong to a front of `points` (W, m), in the order in which they are taken.
+    """The rows of `table` (V, m) that become points of a front of `points` (W, m), in the order in which they are
+    taken.
 
     First those that dominate a point, the best of them first (the least sum of scaled objectives), each in the place of
     all that it dominates. Then those that fill gaps: not dominated, and farther than `GAP` spacings from every point

@@ -28,7 +28,8 @@ SMALL = 0.05
 
 @dataclass(frozen=True)
 class Shape:
-    """In body coordinates. areas: closed lines (n, d), what lies within two is a hole; lines: open; arms: two ends.
+    """What is drawn of a body, in body coordinates. areas: closed lines (n, d), an area within another is a hole;
+    lines: open; arms: two ends.
 
     border: around points that show no shape, a closed line without an area.
     """

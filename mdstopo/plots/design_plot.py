@@ -14,7 +14,7 @@ STEMS = 400
 
 
 def draw(module: Any, source: Source) -> Any:
-    """alpha by member, group beside group."""
+    """Draw alpha by member, group beside group."""
     groups = source.case.group_slices
     above = FEW < len(groups) <= MOST_NAMED  # names beside the stems would hide some
     columns = 2 if max(map(len, groups), default=0) <= SHORT else 1

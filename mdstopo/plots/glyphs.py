@@ -10,7 +10,8 @@ from mdstopo.plots.scenery import Floats
 
 @dataclass(frozen=True)
 class Glyph:
-    """strokes: lines (n, 2); closed: whether their areas are filled, with paper or with ink; words: in a legend."""
+    """The shape of a symbol. strokes: lines (n, 2); closed: whether their areas are filled, with paper or with ink;
+    words: in a legend."""
 
     strokes: tuple[Floats, ...]
     fill: str

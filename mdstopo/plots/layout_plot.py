@@ -104,21 +104,21 @@ def draw_state(
 
 
 def legend_entries(case: Case) -> int:
-    """About how many there will be."""
+    """About how many entries the legend will have."""
     named = len(set(families(case)))
     kinds = {symbol.kind for symbol in symbols(case)}
     return len(case.bodies) + (named if named <= MOST_NAMED else 0) + len(kinds) + bool(case.contacts)
 
 
 def add_legend(figure: Any, axis: Any, thick: Thickness) -> None:
-    """What is drawn, above the picture."""
+    """Add a legend of what is drawn, above the picture."""
     handles, labels = legend_handles(axis)
     title = f"width: {thick.what}" if thick.what else None
     figure.legend(handles, labels, loc="outside upper left", ncols=COLUMNS, title=title, alignment="left")
 
 
 def draw_gravity(axis: Any, gravity: Floats) -> None:
-    """An arrow in the upper right corner."""
+    """Draw the direction of gravity as an arrow in the upper right corner."""
     angle = float(np.arctan2(gravity[1], gravity[0]))
     corner = axis.inset_axes((0.93, 0.86, 0.07, 0.14))
     corner.set_axis_off()

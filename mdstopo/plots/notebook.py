@@ -32,7 +32,7 @@ class InMemory(Source):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The objectives' names."""
+        """The names of the objectives."""
         return tuple(objective.name for objective in self.case.objectives)
 
     def motion(self, load_case: str, times: Floats | None = None) -> Motion:

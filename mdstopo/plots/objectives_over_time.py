@@ -19,6 +19,6 @@ def response_history(engine: "Evaluator", alpha: Floats, load_case: str, times: 
     motion = engine.trajectory(alpha, load_case)
     if times[-1] > motion.t[-1]:
         raise ValueError(f"the motion in load case {load_case} ends at {motion.t[-1]:g} s: {motion.status.value}")
-    looked = [objective.name for objective in engine.case.objectives if objective.load_case == load_case]
+    names = [objective.name for objective in engine.case.objectives if objective.load_case == load_case]
     design = engine.computed(engine.design(alpha))
-    return dict(zip(looked, engine.driver(load_case).response_history(design, times), strict=False))
+    return dict(zip(names, engine.driver(load_case).response_history(design, times), strict=False))

@@ -10,7 +10,8 @@ from mdstopo.store.result_reader import ResultView
 
 @dataclass(frozen=True)
 class Plot:
-    """place: module and function that draw it; what: a sentence; options: of the command that it understands."""
+    """A kind of picture. place: module and function that draw it; what: a sentence; options: of the command that it
+    understands."""
 
     place: tuple[str, str]
     what: str

@@ -53,7 +53,7 @@ def solid(case: Case, body: str) -> Solid:
 
 
 def joined(parts: list[Solid]) -> Solid:
-    """Several as one."""
+    """Several solids as one."""
     if len(parts) == 1:
         return Solid(parts[0].corners, parts[0].faces, parts[0].edges, convex=False)
     first = np.cumsum([0, *(len(part.corners) for part in parts)]).tolist()
@@ -92,7 +92,7 @@ def _lines(points: Floats, grids: list[Floats]) -> Solid:
 
 
 def convex(points: Floats) -> Solid:
-    """The convex hull of points (n, 3)."""
+    """The convex hull of points (n, 3), as a solid."""
     points = np.unique(points, axis=0)
     middle = points.mean(axis=0)
     size = float(np.abs(points - middle).max())

@@ -27,7 +27,7 @@ SAMPLES = 401
 
 @dataclass(frozen=True)
 class Motion:
-    """t (T,), q (T, 3 n_bodies) of one load case."""
+    """The motion of one load case: times t (T,) and coordinates q (T, 3 n_bodies)."""
 
     t: Floats
     q: Floats
@@ -116,7 +116,7 @@ class Source:
 
     @property
     def load_cases(self) -> tuple[str, ...]:
-        """Names of the load cases."""
+        """The names of the load cases."""
         return tuple(each.name for each in self.case.load_cases)
 
     def motion(self, load_case: str, times: Floats | None = None) -> Motion:
@@ -138,7 +138,7 @@ class Source:
 
     @cached_property
     def engine(self) -> "Evaluator":
-        """The case, compiled."""
+        """The case, compiled: what evaluates designs and motions."""
         from mdstopo.engine import Evaluator
 
         return Evaluator(self.case)

@@ -25,7 +25,7 @@ MARGIN = 0.08
 
 
 class Stage:
-    """Where the states (T, n) of a result are drawn."""
+    """Draws the states (T, n) of a result, in a plane or as views of space."""
 
     def __init__(self, source: Source, states: Floats) -> None:
         self.source, self.case = source, source.case
@@ -82,7 +82,7 @@ class Stage:
                 axis.plot(*flat[list(edge)].T, "-", color=colour(k + 2), linewidth=0.7, alpha=faint, zorder=1.4)
 
     def seen(self, places: Floats) -> Floats:
-        """Places (n, d) on the paper, (n, 2)."""
+        """Coordinates (n, 2) on the paper of places (n, d) in the scene."""
         return self.view.seen(places) if self.case.dimension == 3 else places
 
     def ends(self, q: Floats) -> Any:

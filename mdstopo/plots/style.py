@@ -73,7 +73,7 @@ def ink(strength: str = "full") -> str:
 
 
 def paper() -> str:
-    """The colour of the ground."""
+    """The colour of the background."""
     return _PAPER if is_dark() else "#FFFFFF"
 
 

@@ -93,7 +93,7 @@ def _all_of(glyph: Glyph) -> Any:
 
 
 def legend_handles(axis: Any) -> tuple[list[Any], list[str]]:
-    """What a legend names, symbols last."""
+    """The entries of a legend, those of symbols last."""
     handles, labels = axis.get_legend_handles_labels()
     symbols = {glyph.words for glyph in glyphs().values()}
     order = sorted(range(len(labels)), key=lambda k: labels[k] in symbols)

@@ -21,7 +21,8 @@ LOADS = ("load", "moment")
 
 @dataclass(frozen=True)
 class Symbol:
-    """kind: of `glyphs`. at (d,): in coordinates of `body`; end: the same of another body, to which a line is drawn.
+    """A symbol in a picture. kind: of `glyphs`. at (d,): in coordinates of `body`; end: the same of another body, to
+    which a line is drawn.
 
     way (d,): where it points, in coordinates of `axes`, a body or ground; zero where it points nowhere. size: of the
     largest of its kind, negative for a turn that is clockwise in the plane.
@@ -118,7 +119,7 @@ def _value(signal: Any, time: float) -> float:
 
 
 def placed(case: Case, symbol: Symbol, q: Floats) -> tuple[Floats, Floats | None, Floats | None]:
-    """At a state q: its place (d,), its direction (d,), and the place (d,) of its other end."""
+    """At a state q: the place of a symbol (d,), its direction (d,), and the place (d,) of its other end."""
     state = q[None]
     at = points_at(case, symbol.body, symbol.at[None], state)[0, 0]
     end = None if symbol.end is None else points_at(case, symbol.end[0], symbol.end[1][None], state)[0, 0]

@@ -23,7 +23,8 @@ STATES, MANY = 400, 20_000
 
 @dataclass(frozen=True)
 class Thickness:
-    """shares: of each group (M,), from 0 to 1, relative to the largest; what: what they show, in words."""
+    """How thick members are drawn. shares: of each group (M,), from 0 to 1, relative to the largest; what: what they
+    show, in words."""
 
     shares: tuple[Floats, ...]
     what: str

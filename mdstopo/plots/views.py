@@ -15,7 +15,8 @@ FAR = 4.0
 
 @dataclass(frozen=True)
 class View:
-    """What is drawn of a place p: the scalar products with `across` and `along`; `toward` is the way to the eye.
+    """A projection of the scene: coordinates are the products with `across` and `along`; `toward` is the direction
+    to the eye.
 
     With an eye (at that distance from the middle of the scene) it is perspective: what is nearer is larger.
     """
@@ -28,7 +29,7 @@ class View:
     eye: float = np.inf
 
     def seen(self, places: Floats) -> Floats:
-        """(..., 2) of places (..., 3)."""
+        """Coordinates (..., 2) in this view of places (..., 3)."""
         if not np.isfinite(self.eye):
             return np.stack([places @ np.abs(self.across), places @ np.abs(self.along)], axis=-1)
         away = places - self.middle
@@ -55,7 +56,8 @@ def upright(case: Case) -> Floats:
 
 
 def views(case: Case, middle: Floats, radius: float) -> dict[str, View]:
-    """Front, top, side and perspective of a scene around a middle, as large as a radius."""
+    """The views of a scene, from the front, from above, from the side and in perspective, around a middle, as large as
+    a radius."""
     right, away, up = upright(case)
     turn, rise = np.radians(TURN), np.radians(RISE)
     level = np.cos(turn) * away - np.sin(turn) * right  # the way of the look, seen from above

@@ -50,7 +50,8 @@ class Designs:
 
 @dataclass(frozen=True)
 class Difference:
-    """case: keys that differ; outcome: status and such; objectives, constraints: values; designs: None without any."""
+    """How two results differ. case: keys that differ; outcome: status and such; objectives, constraints: values;
+    designs: None without any."""
 
     case: list[Pair] = field(default_factory=list)
     outcome: list[Pair] = field(default_factory=list)
@@ -60,7 +61,7 @@ class Difference:
 
     @property
     def is_none(self) -> bool:
-        """Whether nothing differs."""
+        """Whether the two results do not differ in anything."""
         same = all(
             pair.first == pair.second for pair in (*self.case, *self.outcome, *self.objectives, *self.constraints)
         )
@@ -69,7 +70,7 @@ class Difference:
 
 
 def difference(first: Source, second: Source) -> Difference:
-    """What differs between two results."""
+    """The differences between two results."""
     return Difference(
         _keys(first.case, second.case),
         _outcome(first, second),

@@ -54,7 +54,7 @@ class GltfFile:
         return self.add("accessors", **entry)
 
     def binary(self) -> bytes:
-        """The whole file."""
+        """The bytes of the whole file."""
         document: dict[str, Any] = {"asset": self._asset, "scene": 0, **self.parts}
         document["buffers"] = [{"byteLength": len(self._data)}]
         text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()

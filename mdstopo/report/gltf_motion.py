@@ -35,7 +35,8 @@ _NEUTRAL, _CONTACT = "#555555", "#8A8A8A"
 
 
 class Poses(NamedTuple):
-    """t (T,) from 0 on in s; q (T, n): a trajectory's states; of bodies place (T, B, 3) and turn (T, B, 4), w x y z."""
+    """A motion for an animation. t (T,) from 0 on in s; q (T, n): a trajectory's states; of bodies place (T, B, 3) and
+    turn (T, B, 4), w x y z."""
 
     t: Floats
     q: Floats
@@ -44,7 +45,8 @@ class Poses(NamedTuple):
 
 
 def motion_file(source: Source, slower: float = 1.0) -> tuple[bytes, int]:
-    """The file, and how many members were left out of it. slower: by this factor the animations are."""
+    """The glTF file of a motion, and how many members were left out of it. slower: by this factor the animations
+    are."""
     return _Scene(source, slower).file()
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def page(data: dict[str, Any]) -> str:
-    """HTML that needs nothing else."""
+    """The page of a report as one HTML file, which needs nothing else."""
     folder = files("mdstopo.report")
     scene = "scene_space.js" if data["dimension"] > 2 else "scene_plane.js"
     names = ("page.css", "glyphs.js", scene, "page.js", "page.html")

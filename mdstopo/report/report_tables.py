@@ -82,7 +82,7 @@ def constraint_rows(source: Source) -> list[dict[str, Any]]:
 
 
 def constraint_words(case: Case, row: Any) -> str:
-    """What a constraint bounds."""
+    """What a constraint bounds, in words."""
     if not isinstance(row, ResponseRow):
         return f"volume of {', '.join(row.groups)}"
     where = f", {row.load_case}" if len(case.load_cases) > 1 else ""

@@ -44,7 +44,7 @@ class Watched:
         self._picture = ""
 
     def state(self) -> dict[str, Any]:
-        """What the page shows."""
+        """How far the run has come, as the page shows it."""
         with self._lock:
             self._refresh()
             return self._state
@@ -83,7 +83,7 @@ def _drawn(source: Source) -> str:
 
 
 def state_of(view: ResultView, source: Source) -> dict[str, Any]:
-    """Status, and the columns of iterations, points or runs."""
+    """The state of a result for the page: status, and the columns of iterations, points or runs."""
     objectives = {each.name: each for each in source.case.objectives}
     names = list(view.lines("objectives")) if "objectives" in view.texts else []
     state: dict[str, Any] = {

@@ -8,7 +8,7 @@ from mdstopo.case.model import Case, Objective, Response, ResponseRow, VolumeRow
 
 
 def other_problem(case: Case, made: Case) -> str:
-    """What the case at a point has otherwise than the case, and must not; nothing where a design fits both."""
+    """What the case at a point has otherwise than the case, though designs have to fit both; empty where nothing is."""
     return next(_members(case, made), "") or next(_aims(case, made), "")
 
 

@@ -52,7 +52,8 @@ class Robust:
 
 @dataclass(frozen=True)
 class Conclusion:
-    """By objective, then by bounded response; points of the fresh sample, and of those that could not be computed."""
+    """The results of the final design on samples, by objective, then by bounded response; and how many points could be
+    computed."""
 
     results: tuple[Robust, ...]
     points: int

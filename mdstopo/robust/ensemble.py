@@ -29,7 +29,7 @@ NOMINAL = -1
 
 @dataclass(frozen=True)
 class Part:
-    """What one point gives: what competes, by objective and by constraint's place; how it ended; the work done."""
+    """The results at one point: what competes, by objective and by constraint's place; how it ended; the work done."""
 
     peaks: Mapping[str, tuple[Peak, ...]]
     limits: Mapping[int, tuple[Peak, ...]]
@@ -39,7 +39,7 @@ class Part:
 
 
 class Ensemble(Evaluator):
-    """An uncertain case, ready to be evaluated again and again.
+    """An uncertain case, compiled at all points of its sample, whose designs can be evaluated again and again.
 
     points: evaluators of those points of the sample that this process computes, and of the nominal case, by place.
     Raises CaseError where the case at a point is none, with the point and its values.
@@ -48,13 +48,13 @@ class Ensemble(Evaluator):
     def __init__(
         self,
         case: Case,
-        beside: bool = True,
+        in_background: bool = True,
         points: dict[int, Evaluator] | None = None,
         workers: "PointWorkers | None" = None,
         share: Sequence[str] = (),
     ) -> None:
         assert case.uncertainty is not None
-        super().__init__(case, beside, share)
+        super().__init__(case, in_background, share)
         self.uncertainty = case.uncertainty
         self.sample: Sample = design_sample(case.uncertainty)
         self.workers = workers
@@ -65,7 +65,7 @@ class Ensemble(Evaluator):
         self._wanted = range(len(self.sample)) if any(measure.is_sampled for measure in measures) else range(0)
         if points is None:
             points = {i: evaluator_at(case, self.sample, i) for i in range(len(self.sample))}
-            points[NOMINAL] = nominal_evaluator(case, beside=False)
+            points[NOMINAL] = nominal_evaluator(case, in_background=False)
         self.points = points
 
     # -- what a run asks
@@ -83,10 +83,10 @@ class Ensemble(Evaluator):
         parts = self._parts(wanted, design, gradient, sensitivity)
         status, message = self._verdict_of(parts)
         counts = {name: sum(part.work[name] for part in parts.values()) for name in WORK_NAMES}
-        looked: dict[str, tuple[Peak, ...]] = {}
+        all_peaks: dict[str, tuple[Peak, ...]] = {}
         if status.usable or status is Status.NO_GRADIENT:
-            looked = self._looked(parts)
-        found = self._evaluation(looked, gradient and status.usable, counts, status, message)
+            all_peaks = self._measured_peaks(parts)
+        found = self._evaluation(all_peaks, gradient and status.usable, counts, status, message)
         return found._replace(all_compete=True)
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
@@ -124,24 +124,24 @@ class Ensemble(Evaluator):
         )
 
     def otherwise(self, sample: int = 0, **solver: Any) -> "Ensemble":
-        """As of `Evaluator`; every point has the settings, and is rounded otherwise as that sample."""
+        """See `Evaluator.otherwise`; every point has the settings, and is rounded otherwise as that sample says."""
         key = (sample, *sorted(solver.items()))
         if key not in self._others:
             case = replace(self.case, solver=replace(self.case.solver, **solver))
             points = {i: point.otherwise(sample, **solver) for i, point in self.points.items()}
-            self._others[key] = Ensemble(case, self._compiles_beside, points)
+            self._others[key] = Ensemble(case, self._compiles_in_background, points)
         found = self._others[key]
         assert isinstance(found, Ensemble)
         return found
 
-    def looking_at(self, objectives: Sequence[str]) -> "Ensemble":
-        """As of `Evaluator`."""
+    def with_objectives(self, objectives: Sequence[str]) -> "Ensemble":
+        """An evaluator of some of the objectives alone; see `Evaluator.with_objectives`."""
         names = tuple(objectives)
         if names == self._names:
             return self
         if names not in self._narrower:
             chosen = tuple(objective for objective in self.case.objectives if objective.name in names)
-            points = {i: point.looking_at(names) for i, point in self.points.items()}
+            points = {i: point.with_objectives(names) for i, point in self.points.items()}
             self._narrower[names] = Ensemble(replace(self.case, objectives=chosen), False, points, self.workers)
         found = self._narrower[names]
         assert isinstance(found, Ensemble)
@@ -149,11 +149,11 @@ class Ensemble(Evaluator):
 
     @property
     def held(self) -> int:
-        """Bytes of the steps that are held between calls."""
+        """How many bytes of steps are kept between calls."""
         return super().held + sum(point.held for point in self.points.values())
 
     def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any:
-        """As of `Evaluator`; every point is evaluated once more in this process, whoever did it before."""
+        """See `Evaluator.pricing_states`; every point is evaluated once more in this process."""
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
         design = self._design.values.copy()
         parts = {i: self.part(i, design, True, None) for i in wanted}
@@ -161,10 +161,10 @@ class Ensemble(Evaluator):
         unit = iter(np.eye(sum(counts.values())))
         # the same parts with one number a peak in the place of its gradient: how a measure is made of them
         marked = {i: _marked(part, unit) for i, part in parts.items()}
-        looked = self._looked(marked)
+        all_peaks = self._measured_peaks(marked)
         shares = np.zeros(sum(counts.values()))
         for key, factors in weights.items():
-            for factor, peak in zip(factors, looked[key], strict=False):
+            for factor, peak in zip(factors, all_peaks[key], strict=False):
                 assert peak.gradient is not None
                 shares += factor * peak.gradient
         states = []
@@ -177,7 +177,7 @@ class Ensemble(Evaluator):
     # -- points
 
     def spread(self, workers: "PointWorkers | None") -> None:
-        """Have other processes compute most of the points from now on; None: this one alone."""
+        """Let other processes compute most of the points from now on; None: this process alone."""
         self.workers = workers
         self._narrower.clear()
 
@@ -192,7 +192,7 @@ class Ensemble(Evaluator):
         return [case for beyond, case in found.items() if beyond != bool(self.beyond)]
 
     def part(self, i: int, design: FloatArray, gradient: bool, sensitivity: str | None) -> Part:
-        """What point i gives; NOMINAL: the nominal case."""
+        """The result at point i; NOMINAL: of the nominal case."""
         point = self.points[i]
         found = point.evaluate(design, gradient, sensitivity)
         limits = dict(found.constraint_peaks)
@@ -219,13 +219,13 @@ class Ensemble(Evaluator):
         where = "in the nominal case" if i == NOMINAL else name_of(self.case, self.sample, i)
         return first.status, f"{first.message}, {where}" if first.message else where
 
-    def _looked(self, parts: Mapping[int, Part]) -> dict[str, tuple[Peak, ...]]:
+    def _measured_peaks(self, parts: Mapping[int, Part]) -> dict[str, tuple[Peak, ...]]:
         """The rows of each measure."""
-        looked = {}
+        all_peaks = {}
         for objective in self.case.objectives:
             found = {i: part.peaks[objective.name] for i, part in parts.items()}
             measure = self.uncertainty.objectives[objective.name]
-            looked[objective.name] = self._measured(objective, measure, found, sign_of(objective))
+            all_peaks[objective.name] = self._measured(objective, measure, found, sign_of(objective))
         for place in self._limits:
             row = self.case.constraints[place]
             assert isinstance(row, ResponseRow)
@@ -234,8 +234,8 @@ class Ensemble(Evaluator):
             sign = -1.0 if row.sense == "at_least" else 1.0
             made = self._measured(row, measure, found, sign)
             # an equality has one row for each of its sides, so that no others may stand in for it
-            looked[f"constraints[{place}]"] = made[:1] if row.sense == "equals" else made
-        return looked
+            all_peaks[f"constraints[{place}]"] = made[:1] if row.sense == "equals" else made
+        return all_peaks
 
     def _measured(
         self, of: Objective | ResponseRow, measure: Measure, found: Mapping[int, tuple[Peak, ...]], sign: float

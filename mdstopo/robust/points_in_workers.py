@@ -19,7 +19,7 @@ from mdstopo.workers.worker_pool import Lost, Parent, Perform, WorkerError, Work
 
 
 class PointWorkers:
-    """workers - 1 processes beside this one. Close them in the end.
+    """Processes beside this one that compute points of a sample: workers - 1 of them, to be closed in the end.
 
     notify: is given a sentence for each process that is lost; its share is computed again by another one.
     """
@@ -88,7 +88,7 @@ def open_points(case: Case) -> Perform:
         names, design, gradient, sensitivity, share = rest
         if share not in kept:
             kept[share] = Ensemble(case, False, {i: evaluator_at(case, sample, i) for i in share})
-        chosen = kept[share].looking_at(names)
+        chosen = kept[share].with_objectives(names)
         return {i: chosen.part(i, design, gradient, sensitivity) for i in share}
 
     return perform

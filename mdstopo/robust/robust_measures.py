@@ -45,22 +45,22 @@ _ROUNDING, _NONE = 1e-9, 1e-14
 
 
 class Statistic(ABC):
-    """How a measure follows from values: what a record's `made_by` names. It keeps nothing.
+    """The formula by which a measure follows from values; a record's `made_by` names it, and it has no state.
 
     In all functions, y (S,) are values, worse where larger, with probabilities p (S,) of sum 1.
     """
 
     @abstractmethod
     def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
-        """The measure."""
+        """The measure of values y (S,) at points with probabilities p."""
 
     @abstractmethod
     def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
-        """d measure / d y, (S,)."""
+        """(S,) the derivatives of the measure by the values y at the points."""
 
     @abstractmethod
     def rows(self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
-        """See `rows`."""
+        """The rows that stand for the measure in the optimiser; see `rows`."""
 
     @abstractmethod
     def estimate(self, measure: Measure, y: FloatArray) -> Estimate:
@@ -68,14 +68,14 @@ class Statistic(ABC):
 
 
 class Mean(Statistic):
-    """m = sum p y."""
+    """The mean m = sum p y."""
 
     def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
-        """See `Statistic.value`."""
+        """The measure of values y (S,) at points with probabilities p; see `Statistic.value`."""
         return float((p * y).sum())
 
     def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
-        """See `Statistic.slopes`."""
+        """(S,) the derivatives of the measure by the values y at the points; see `Statistic.slopes`."""
         return p.copy()
 
     def rows(self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
@@ -87,26 +87,27 @@ class Mean(Statistic):
         return (made[0], *sorted(others, key=lambda row: -sign * row.value))
 
     def estimate(self, measure: Measure, y: FloatArray) -> Estimate:
-        """By Student's distribution of the influences."""
+        """The measure with an interval of confidence, by Student's distribution of the influences."""
         value, influences = self.influences(measure, y, float(y.mean()))
         half = student(len(y) - 1) * float(influences.std(ddof=1)) / math.sqrt(len(y))
         return Estimate(value, value - half, value + half)
 
     def influences(self, measure: Measure, y: FloatArray, mean: float) -> tuple[float, FloatArray]:
-        """The estimate of the measure, and what each value (n,) has it differ by, times n."""
+        """The estimate of the measure from values, and the influence function of each value (n,): its derivative by
+        that value's weight."""
         return mean, y - mean
 
 
 class MeanAndDeviation(Mean):
-    """m + k s, s^2 = sum p (y - m)^2."""
+    """The mean and k standard deviations: m + k s, with s^2 = sum p (y - m)^2."""
 
     def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
-        """See `Statistic.value`."""
+        """The measure of values y (S,) at points with probabilities p; see `Statistic.value`."""
         mean = super().value(measure, y, p)
         return mean + measure.factor * _deviation(y, p, mean)
 
     def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
-        """See `Statistic.slopes`; those of the mean where all values are the same."""
+        """(S,) the derivatives of the measure by the values y; those of the mean where all values are the same."""
         mean = super().value(measure, y, p)
         deviation = _deviation(y, p, mean)
         if deviation > 0.0:
@@ -114,7 +115,7 @@ class MeanAndDeviation(Mean):
         return super().slopes(measure, y, p)
 
     def influences(self, measure: Measure, y: FloatArray, mean: float) -> tuple[float, FloatArray]:
-        """See `Mean.influences`."""
+        """The estimate of the measure, and the influence function of each value; see `Mean.influences`."""
         deviation = float(y.std(ddof=1))
         value, influences = mean + measure.factor * deviation, y - mean
         if deviation > 0.0:
@@ -126,11 +127,11 @@ class Quantile(Statistic):
     """The smallest y at or below which at least the share `level` of p lies."""
 
     def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
-        """See `Statistic.value`."""
+        """The measure of values y (S,) at points with probabilities p; see `Statistic.value`."""
         return float(y[self.ranked(measure, y, p)[-1]])
 
     def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
-        """See `Statistic.slopes`: 1 of the point whose value it is."""
+        """(S,) the derivatives of the measure by the values y: 1 at the point whose value it is."""
         found = np.zeros(len(y))
         found[self.ranked(measure, y, p)[-1]] = 1.0
         return found
@@ -144,7 +145,7 @@ class Quantile(Statistic):
         return tuple(peak for peak in found[:ROWS] if sign * peak.value >= least)
 
     def estimate(self, measure: Measure, y: FloatArray) -> Estimate:
-        """By two order statistics."""
+        """The quantile with an interval of confidence between two order statistics."""
         value = float(y[_ranked(measure.level, y, np.full(len(y), 1.0 / len(y)))[-1]])
         return Estimate(value, *order_statistics(np.sort(y), measure.level))
 
@@ -154,10 +155,10 @@ class Quantile(Statistic):
 
 
 class Worst(Quantile):
-    """max y. The worst of a sample is estimated as a quantile of the measure's level."""
+    """The largest value. That of a sample is estimated as a quantile of the measure's level."""
 
     def ranked(self, measure: Measure, y: FloatArray, p: FloatArray) -> NDArray[np.intp]:
-        """All points, the first of the worst last."""
+        """The points in an order in which the one that decides the measure is last: the first of the worst."""
         return np.roll(np.arange(len(y)), -1 - int(np.argmax(y)))
 
 
@@ -168,12 +169,12 @@ def _statistic_of(name: str) -> Statistic:
 
 
 def statistic(measure: Measure, y: FloatArray, p: FloatArray) -> float:
-    """The measure of values y (S,), worse where larger."""
+    """The measure of values y (S,) at points with probabilities p; larger values are worse."""
     return _statistic_of(measure.name).value(measure, y, p)
 
 
 def slopes(measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
-    """d measure / d y, (S,)."""
+    """(S,) the derivatives of a measure by the values y at the points."""
     return _statistic_of(measure.name).slopes(measure, y, p)
 
 

@@ -72,7 +72,8 @@ def lattice(n: int, d: int, seed: int) -> Floats:
 
 
 def generators(n: int, d: int) -> NDArray[np.int64]:
-    """The generating vector (d,) of n points, component by component; later numbers weigh less."""
+    """The generating vector (d,) of a lattice of n points, chosen component by component; later components weigh
+    less."""
     every = [z for z in range(1, max(n // 2, 1) + 1) if gcd(z, n) == 1]
     candidates = every[:: -(-len(every) // CANDIDATES)]
     places = np.arange(n)

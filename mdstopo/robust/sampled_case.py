@@ -55,7 +55,7 @@ def evaluator_at(case: Case, sample: Sample, i: int) -> Evaluator:
     """The evaluator of point i, ready to run. Raises CaseError as `case_at`, also for joints that do not fit there."""
     there = case_at(case, sample, i)
     try:
-        made = Evaluator(there, beside=False, beyond=beyond_of(case))
+        made = Evaluator(there, in_background=False, beyond=beyond_of(case))
         for load_case in made.scenes if made.beyond else ():
             made.driver(load_case)
     except CaseError as error:
@@ -63,9 +63,9 @@ def evaluator_at(case: Case, sample: Sample, i: int) -> Evaluator:
     return made
 
 
-def nominal_evaluator(case: Case, beside: bool = True) -> Evaluator:
-    """The evaluator of the case as it is written; beside: as of `Evaluator`."""
-    return Evaluator(nominal_case(case), beside, beyond=beyond_of(case))
+def nominal_evaluator(case: Case, in_background: bool = True) -> Evaluator:
+    """The evaluator of the case as it is written; in_background: as of `Evaluator`."""
+    return Evaluator(nominal_case(case), in_background, beyond=beyond_of(case))
 
 
 def beyond_of(case: Case) -> str:
@@ -75,7 +75,7 @@ def beyond_of(case: Case) -> str:
 
 
 def settings(uncertainty: Uncertainty, sample: Sample, i: int) -> dict[str, Any]:
-    """Keys and values at point i: the scenario's, then the numbers'."""
+    """Keys of the case and their values at point i: those of its scenario, then those of uncertain numbers."""
     place = int(sample.scenario[i])
     stated: dict[str, Any] = dict(uncertainty.scenarios[place].values) if place >= 0 else {}
     numbers = zip(uncertainty.numbers, sample.values[i].tolist(), strict=True)
@@ -83,7 +83,7 @@ def settings(uncertainty: Uncertainty, sample: Sample, i: int) -> dict[str, Any]
 
 
 def name_of(case: Case, sample: Sample, i: int) -> str:
-    """Point i in words, with its values."""
+    """Point i of a sample in words, with its values."""
     uncertainty = _uncertainty(case)
     place = int(sample.scenario[i])
     parts = [f"scenario {uncertainty.scenarios[place].name}"] if place >= 0 else []

@@ -13,8 +13,8 @@ from mdstopo.robust.sampled_case import evaluator_at, name_of
 
 @dataclass(frozen=True)
 class Trial:
-    """objectives (m,), raw; responses (n_con,): what constraints bound, less the bound; NaN, and the reason, where the
-    point cannot be computed."""
+    """A design tried at one point: objectives (m,), raw; responses (n_con,): what constraints bound, less the bound;
+    NaN, and the reason, where it cannot be computed."""
 
     objectives: FloatArray
     responses: FloatArray
@@ -22,7 +22,7 @@ class Trial:
 
 
 def tried(case: Case, sample: Sample, i: int, alpha: FloatArray) -> Trial:
-    """Point i with the design alpha (N,)."""
+    """The case at point i of a sample, evaluated at the design alpha (N,)."""
     lost = np.full(len(case.objectives), np.nan), np.full(len(case.constraints), np.nan)
     try:
         found = evaluator_at(case, sample, i).evaluate(alpha, gradient=False)

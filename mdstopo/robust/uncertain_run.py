@@ -19,7 +19,7 @@ def kinds(engine: Engine) -> list[Case]:
 
 
 def spread(engine: Engine, case: Case, workers: int, helpers: ExitStack, notify: Callable[[str], None]) -> int:
-    """Spread the points over processes, which `helpers` ends; how many processes are left for starts.
+    """Distribute the points over processes, which `helpers` ends. Returns how many processes are left for starts.
 
     Several starts have the processes for themselves.
     """
@@ -33,7 +33,7 @@ def spread(engine: Engine, case: Case, workers: int, helpers: ExitStack, notify:
 
 
 def concluded(engine: Engine, alpha: NDArray[np.float64]) -> Conclusion:
-    """What the final design alpha (N,) comes to on the nominal case, its sample and a fresh one."""
+    """The results of the final design alpha (N,) on the nominal case, its sample and a fresh one."""
     ensemble = _ensemble(engine)
     return conclude(ensemble, alpha, ensemble.evaluate(alpha, gradient=False), ensemble.workers)
 

@@ -24,12 +24,12 @@ def placed(body: Any, local: FloatArray) -> FloatArray:
 
 
 def is_spatial(case: Case) -> bool:
-    """Whether the bodies move in space."""
+    """Whether the bodies of a case move in space, not in a plane."""
     return case.dimension > 2
 
 
 def stands_as(one: LoadCase | Case, other: LoadCase | Case) -> bool:
-    """Whether both have their bodies in the same places at the start."""
+    """Whether two load cases have their bodies in the same places at the start."""
     places = ([(*body.position, *axes_of(body).ravel().tolist()) for body in each.bodies] for each in (one, other))
     return next(places) == next(places)
 

@@ -16,7 +16,8 @@ from mdstopo.scene.springs_model import FloatArray
 
 
 class Border(Protocol):
-    """Turns states of kernels, q (T, n_q) and v, a (T, n), into those that users see; more bodies behind are left out.
+    """Converts states of kernels, q (T, n_q) and v, a (T, n), to the coordinates that users see; bodies that the
+    case has not are left out.
 
     coordinates, freedoms: how many numbers of a body users see in q, and in v and a.
     """
@@ -30,13 +31,13 @@ class Border(Protocol):
 
 @dataclass(frozen=True)
 class PlanarBorder:
-    """x, y, psi of each body, and their derivatives. home (n,): what they are where q is zero."""
+    """In a plane: x, y, psi of each body and their derivatives. home (n,): what they are where q is zero."""
 
     home: FloatArray
     coordinates = freedoms = 3
 
     def places(self, q: FloatArray) -> FloatArray:
-        """q (T, 3 n_bodies): x, y, psi in the coordinates of the case."""
+        """Coordinates of the case, q (T, 3 n_bodies): x, y, psi of each body."""
         return np.asarray(q[:, : len(self.home)] + self.home)
 
     def rates(self, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -47,7 +48,7 @@ class PlanarBorder:
 
 @dataclass(frozen=True)
 class SpatialBorder:
-    """Position and unit quaternion of each body's own axes; velocity and angular velocity, all global.
+    """In space: position and unit quaternion of each body's own axes; velocity and angular velocity, all global.
 
     position (n_bodies, 3), turned (n_bodies, 4): where bodies are at the start, and the quaternion of their axes, whose
     first component that is not 0 is positive. principal (n_bodies, 3, 3): principal axes, in which kernels turn.
@@ -60,7 +61,8 @@ class SpatialBorder:
     freedoms = 6
 
     def places(self, q: FloatArray) -> FloatArray:
-        """q (T, 7 n_bodies): x, y, z; w, x, y, z, continuous in sign as the turns since the start are."""
+        """Coordinates of the case, q (T, 7 n_bodies): x, y, z; w, x, y, z, continuous in sign as the turns since the
+        start are."""
         count = len(self.position)
         own = q[:, : self.coordinates * count].reshape(len(q), count, self.coordinates)
         # kernels turn principal axes from where they were at the start: R(t) = R_start P E P^T
@@ -80,7 +82,7 @@ class SpatialBorder:
 
 
 def border_of(case: Case, bodies: tuple[Any, ...]) -> Border:
-    """The border of a case; bodies: as a load case starts them, in the coordinates of the case."""
+    """The conversion for a case; bodies: as a load case starts them, in the coordinates of the case."""
     if not is_spatial(case):
         return PlanarBorder(np.array([value for body in bodies for value in (*body.position, body.angle)]))
     return SpatialBorder(

@@ -59,12 +59,12 @@ class Scene:
 
     @cached_property
     def n(self) -> int:
-        """Coordinates of the moving bodies."""
+        """The number of coordinates of all moving bodies."""
         return 3 * self.n_bodies
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Coordinates that are free, less the independent rows of joints."""
+        """The number of free coordinates; there are no joints."""
         return self.n
 
     @property
@@ -82,8 +82,8 @@ NEAR = 0.01
 
 @dataclass(frozen=True)
 class Members:
-    """What all load cases share, as in `Model`: pairs (n, 2), blocks, powers, nearness, member arrays; and the shortest
-    initial length of each block."""
+    """The arrays that all load cases have in common, as in `Model`: pairs (n, 2), blocks, powers, nearness, member
+    arrays; and the shortest initial length of each block."""
 
     pairs: IndexArray
     block: IndexArray

@@ -37,7 +37,7 @@ SIXTH = ((1.0, 0.75), (2.0, -0.15), (3.0, 1.0 / 60.0))
 
 
 class DesignMap:
-    """Between designs of a case (N + P,) and of the one that scenes are made of (N + P',).
+    """The map between designs of a case (N + P,) and designs of the case that scenes are made of (N + P',).
 
     case: the latter. Its variables are those of the former that are no names, then numbers of laws and coordinates of
     points that follow from the names, then the names from which masses, loads and velocities follow.
@@ -94,7 +94,7 @@ class DesignMap:
         self._values = np.zeros(len(self._laws))
 
     def design(self, stated: FloatArray) -> FloatArray:
-        """The design (N + P',) of a stated one (N + P,), from which on `pull_back` is at that one."""
+        """The design (N + P',) of scenes for a stated one (N + P,), at which `pull_back` is from now on."""
         self._x = stated[self._names]
         self._values = self._of_laws.values(self._x)
         design = np.empty(self.case.space.length)
@@ -115,7 +115,7 @@ class DesignMap:
         return out
 
     def why_not(self, gradient: bool) -> str:
-        """Why nothing can be computed at the design that was mapped last, or no derivative; or nothing."""
+        """Why the design that was mapped last, or a derivative there, cannot be computed; empty where it can."""
         finite = np.isfinite(self._of_laws.slopes(self._x)).all(axis=1) if gradient else np.isfinite(self._values)
         if finite.all():
             return ""
@@ -183,7 +183,7 @@ class _Points:
 
 
 class CasesWith:
-    """A case at other values of numbers that follow from names, without some sections."""
+    """The case at other values of the numbers that follow from names, without some of its sections."""
 
     def __init__(self, case: Case, numbers: Sequence[Following], without: tuple[str, ...] = ()) -> None:
         self._document = Document(case.text, path=case.path, overrides=case.overrides)

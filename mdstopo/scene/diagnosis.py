@@ -18,7 +18,7 @@ COLLAPSED = 1e-4
 
 
 class Diagnosis:
-    """Names for the indices of one scene."""
+    """Words for what went wrong: which body or member of the scene an index means."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self.case = case

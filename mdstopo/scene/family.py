@@ -49,8 +49,8 @@ def beyond_springs(case: Case) -> str:
 
 
 def beyond_collocation(case: Case) -> str:
-    """What in the case steps of collocation do not carry, in words; empty where nothing is: bodies have to be free, and
-    forces smooth."""
+    """What in the case cannot be computed in steps of collocation, in words; empty where nothing is: bodies have to be
+    free, and forces smooth."""
     if case.joints:
         return "joints"
     if case.contacts:
@@ -65,7 +65,7 @@ def beyond_collocation(case: Case) -> str:
 
 
 def collocates(case: Case) -> bool:
-    """Whether a case that goes beyond springs is one for steps of collocation: free bodies, smooth forces."""
+    """Whether a case can be computed in steps of collocation: free bodies, smooth forces."""
     return not beyond_collocation(case)
 
 

@@ -27,7 +27,8 @@ STRIDE = 128
 
 
 def row_of(group: MemberGroup, elastic: bool) -> tuple[int, int]:
-    """Places and members of a row; zeros where kernels for grids cannot be used, or would not pay."""
+    """How many places and members a row of the grid of members has; zeros where kernels for grids cannot be used, or
+    would not pay."""
     length = _members_of_a_row(group)
     width = -(-length // WIDE) * WIDE
     if width % STRIDE == 0:

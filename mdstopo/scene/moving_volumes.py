@@ -21,7 +21,7 @@ from mdstopo.scene.design_map import DesignMap
 
 
 def moves(case: Case, group: MemberGroup) -> bool:
-    """Whether members of a group cost their length, and it varies."""
+    """Whether the members of a group cost their length, and that varies."""
     names = {each.grid for each in case.movable}.union(*(each.moved for each in case.variables))
     return group.design and group.cost_varies(names)
 

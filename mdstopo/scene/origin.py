@@ -125,8 +125,8 @@ def seen_from(case: Case, origin: Point) -> Case:
         members=tuple(_group(group, bodies, origin) for group in case.members),
         contacts=tuple(_contact(contact, origin) for contact in case.contacts),
         load_cases=tuple(_load_case(load_case, origin) for load_case in case.load_cases),
-        objectives=tuple(_looked(objective, origin) for objective in case.objectives),
-        constraints=tuple(_looked(row, origin) if isinstance(row, ResponseRow) else row for row in case.constraints),
+        objectives=tuple(_aim_from(objective, origin) for objective in case.objectives),
+        constraints=tuple(_aim_from(row, origin) if isinstance(row, ResponseRow) else row for row in case.constraints),
         joints=tuple(_tie(joint, origin) for joint in case.joints),
         bushings=tuple(_tie(bushing, origin) for bushing in case.bushings),
         movable=tuple(
@@ -185,7 +185,7 @@ def _contact(contact: AnyContact, origin: Point) -> AnyContact:
     return contact
 
 
-def _looked(row: _Row, origin: Point) -> _Row:
+def _aim_from(row: _Row, origin: Point) -> _Row:
     """An objective or constraint; the place of its point, if that is on ground, counts from `origin`."""
     return replace(row, response=_seen(row.response, origin))
 

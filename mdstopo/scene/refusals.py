@@ -15,7 +15,7 @@ from mdstopo.settings.optimizers import OPTIMIZERS
 
 
 def no_derivatives(case: Case, method: str) -> tuple[str, str]:
-    """The place of what a method does not differentiate by, and why it does not go with it."""
+    """The place of a design variable by which a method does not differentiate, and why not."""
     if all(each.points for each in case.variables):
         place, what = f"points.{case.movable[0].grid}.movable", "coordinates of points"
     else:

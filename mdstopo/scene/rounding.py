@@ -21,7 +21,8 @@ APART = 0.05, 0.2
 
 
 def rounded_otherwise(case: Case, origin: Point, size: float, sample: int) -> Case:
-    """The case in coordinates from a point near `origin`, with neighbours of its numbers; sample: which, from 1."""
+    """The same case with other rounding: in coordinates from a point near `origin`, its numbers changed in the last
+    digit; sample: which, from 1."""
     random = np.random.default_rng(sample)
     apart = (size * random.uniform(*APART, len(origin))).tolist()
     moved = seen_from(case, tuple(zero + away for zero, away in zip(origin, apart, strict=True)))

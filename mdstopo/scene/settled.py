@@ -7,7 +7,7 @@ from mdstopo.scene.springs_model import FloatArray
 
 @dataclass(frozen=True)
 class Settled:
-    """An equilibrium.
+    """The static equilibrium from which the motion starts.
 
     q (n_q,): what the bodies have moved since home.
     inverse (n, n): dq = inverse dF. moved: how far the centre of a body has gone at most, m, and whose it is;

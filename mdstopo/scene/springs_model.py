@@ -65,7 +65,7 @@ LoadForce = Annotated[
 
 
 class Springs(NamedTuple):
-    """What a pass over the members needs of a `Model`: few arrays, because handing over many takes its time."""
+    """The few arrays of a `Model` that a pass over the members needs: handing over many takes time."""
 
     block: IndexArray
     member: FloatArray

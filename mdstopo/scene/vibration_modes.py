@@ -14,7 +14,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Modes:
-    """Modes about the start.
+    """Modes of small undamped vibration about the start.
 
     matrix (K, K): stiffness of the directions that joints leave, by the mass; basis (n, K): these directions, as
     velocities of the bodies' freedoms of kinetic energy 1/2. scale: the largest entry of the stiffness by the mass

@@ -27,18 +27,18 @@ class SpringsDriver(Driver):
     """One scene of springs between free bodies, ready to run; `integrators.scene_driver.SceneDriver` tells how."""
 
     def __init__(self, case: Case, scene: Scene, options: DriverOptions) -> None:
-        kinds = [REDUCTIONS[each.over_time] for each in options.looked]
+        kinds = [REDUCTIONS[each.over_time] for each in options.aims]
         reductions = np.array([resolve_name(kind.springs) for kind in kinds], dtype=np.int64)
         integrated = any(kind.is_integral for kind in kinds)
         super().__init__(scene, options, _response_entries, reductions, integrated)
         self.case = case
         self._diagnosis = Diagnosis(case, scene)
 
-    def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
+    def differentiate(self, method: str, alpha: FloatArray, result: ResponseResult, cones: bool) -> Differentiated:
         """Gradients of what `evaluate` found; energies are no norms, so `cones` changes nothing."""
         from mdstopo.sensitivity.springs_methods import differentiate
 
-        return differentiate(method, self, alpha, looked)
+        return differentiate(method, self, alpha, result)
 
     def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and the derivative (T, N) of the stored energy at them, by `direct`."""

@@ -76,7 +76,8 @@ def without_slope(case: Case, found: Evaluation) -> tuple[str, ...]:
 
 
 def may_soften(case: Case, load_case: str) -> bool:
-    """Whether energy is minimised in this load case and nothing there restrains the motion."""
+    """Whether energy is minimised in this load case and nothing limits the motion, so that the softest design would be
+    best."""
     energy = any(kind_of(each.response).is_energy and each.load_case == load_case for each in _minimised(case))
     return energy and not is_held(case, load_case)
 
@@ -89,10 +90,10 @@ def _prescribed(before: Motion, after: Motion) -> bool:
 
 
 def is_held(case: Case, load_case: str) -> bool:
-    """Whether a displacement or an angle is bounded from above, or minimised, in this load case."""
-    looked: list[Objective | ResponseRow] = [*_minimised(case)]
-    looked += [row for row in case.constraints if isinstance(row, ResponseRow) and row.sense in ("limit", "equals")]
-    return any(each.load_case == load_case and kind_of(each.response).is_position for each in looked)
+    """Whether a displacement or an angle is limited, or minimised, in this load case."""
+    aims: list[Objective | ResponseRow] = [*_minimised(case)]
+    aims += [row for row in case.constraints if isinstance(row, ResponseRow) and row.sense in ("limit", "equals")]
+    return any(each.load_case == load_case and kind_of(each.response).is_position for each in aims)
 
 
 def _minimised(case: Case) -> list[Objective]:

@@ -12,7 +12,8 @@ SMALL = 0.05
 
 
 def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
-    """Why the case's fixed step is too long for a motion, naming who turns round so fast; nothing where it is not.
+    """Why the case's fixed step is too long for a motion, and which body turns round too fast for it; empty where it
+    is not.
 
     A velocity that swings back and forth within fewer than ten steps is not resolved: between two instants at which it
     turns round, half a period, there are fewer than five. Swings below a twentieth of the largest speed do not count.

@@ -30,7 +30,7 @@ class NoUtopiaError(Exception):
 
 
 class Combining:
-    """The individual optima of one run, each solved once and kept, and the U that follows from them."""
+    """The optima of the objectives alone, each found once and kept, and the U that follows from them."""
 
     def __init__(self, case: Case) -> None:
         self.case = case
@@ -46,7 +46,7 @@ class Combining:
 
     @property
     def evaluations(self) -> int:
-        """Designs that were evaluated for it."""
+        """How many designs were evaluated for the combination."""
         return sum(self.solved[key].evaluations for key in self.used)
 
     def scalarisation(
@@ -124,7 +124,8 @@ class Combining:
         return found
 
     def part(self, visited: Floats) -> Datasets:
-        """What the result file holds of it. visited (K, m): raw values so far, for better utopia than was known."""
+        """The datasets that the result file has of it. visited (K, m): raw values so far, in case utopia is better than
+        was known."""
         kept = [found for key, found in self.solved.items() if key in self.used] or list(self.solved.values())
         part: Datasets = tasks_part(kept, self.case, "combine/tasks") if kept else {}
         part |= begun_part(self.begun, "combine/tasks")

@@ -4,7 +4,7 @@ Why it is not this one, `starts.getting_ready` tells. Another process is this mo
 all that the case needs; with the word `back` what the optimiser needs and what looks back at steps that were made. For
 scenes with joints and other laws both run side by side, the longest entries first, and what the one has compiled the
 other finds on the disk. Where nothing is optimised, one process beside this one has a share of its own, `responses` or
-`steps`: `compiled_beside`.
+`steps`: `compiling_in_background`.
 """
 
 import contextlib
@@ -37,7 +37,7 @@ FEW_CANDIDATES = 1000
 
 
 def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
-    """Have another process compile what the case needs, unless that is known to be cached."""
+    """Compile what the case needs in another process, unless it is known to be cached."""
     marker = _marker(case)
     if is_kept(marker.name):
         return
@@ -71,7 +71,7 @@ def _compile_in_children(message: bytes, each: list[list[str]]) -> None:
 
 
 @contextlib.contextmanager
-def compiled_beside(case: Case, share: str) -> Iterator[None]:
+def compiling_in_background(case: Case, share: str) -> Iterator[None]:
     """Meanwhile another process compiles a share of what a scene with joints or other laws needs, where nothing of it
     is there yet: with RESPONSES what looks back at steps, with STEPS what makes steps, where `auto` has to.
 
@@ -115,8 +115,8 @@ def _end(child: subprocess.Popen[bytes]) -> None:
         child.stdin.close()
 
 
-def compile_share() -> None:
-    """Compile what few variables need: the share of the process beside this one (`warm`) where there are many."""
+def compile_in_background() -> None:
+    """Compile what few variables need: the share of the background process (`warm`) where there are many."""
     meet(tiny("auto"), FEW)
 
 
@@ -135,9 +135,9 @@ def _main() -> None:
     case: Case = pickle.load(sys.stdin.buffer)
     end_with_parent(sys.stdin.buffer)
     if RESPONSES in sys.argv[1:]:
-        evaluator_of(case, beside=False).compile_responses()
+        evaluator_of(case, in_background=False).compile_responses()
     elif STEPS in sys.argv[1:]:
-        engine = evaluator_of(case, beside=False)
+        engine = evaluator_of(case, in_background=False)
         if engine.may_simulate_to_choose:
             engine.compile_steps()
     elif BACK in sys.argv[1:]:
@@ -149,7 +149,7 @@ def _main() -> None:
 
 def _compile_back(case: Case) -> None:
     """Compile what looks back at steps, and the optimiser."""
-    engine = evaluator_of(case, beside=False)
+    engine = evaluator_of(case, in_background=False)
     engine.compile_responses()
     meet(case, FEW)
     if getattr(problem_of(engine, even(case)), "competes", False):

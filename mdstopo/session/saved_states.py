@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 def best_of(case: Case, states: Sequence[State | None]) -> int | None:
-    """Index of the start whose result counts; None where none has begun."""
+    """The index of the start whose result is that of the run; None where none has begun."""
     if all(state is None for state in states):
         return None
     return best_run(furthest(list(states)), case.optimizer.tolerance)
@@ -55,7 +55,7 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
 
 
 def best_row(state: State) -> int:
-    """The iterate that is the best design."""
+    """The number of the iterate that is the best design."""
     first = first_row(state)
     objective = np.array(state.history.objective[first:])
     found = np.flatnonzero(objective == state.best_objective)
@@ -63,7 +63,7 @@ def best_row(state: State) -> int:
 
 
 def run_part(case: Case, states: Sequence[State | None], before: int = 0, final: Floats | None = None) -> Datasets:
-    """Everything a run has reached: best design, its iterations, every start, every optimiser's state.
+    """The datasets of a run: best design, its iterations, every start, every optimiser's state.
 
     before, final: as of `iteration_columns`.
     """

@@ -42,12 +42,13 @@ def of_many(ends: Sequence[tuple[RunStatus, float]], noun: str, tolerance: float
 
 
 def residual(kkt: float) -> str:
-    """A residual in words."""
+    """A KKT residual in words."""
     return f"{kkt:.2g}" if np.isfinite(kkt) else "unknown size"
 
 
 def holders(case: Case, state: State) -> list[str]:
-    """The objective and the constraints whose rows carry the largest share of the Lagrangian's gradient, that first.
+    """The objective and the constraints that hold the iterate, by their share of the Lagrangian's gradient, the
+    largest first.
 
     Empty where the optimiser does not tell.
     """

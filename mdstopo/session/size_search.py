@@ -42,7 +42,7 @@ BEGINNINGS = 8
 
 
 class Catalogued(NamedTuple):
-    """Variables with a catalogue.
+    """The variables of a problem that take sizes from a catalogue.
 
     place (k,): which of x (n,) they are. sizes, prices: of each, rising.
     """
@@ -52,7 +52,7 @@ class Catalogued(NamedTuple):
     prices: tuple[Floats, ...]
 
     def at(self, x: Floats, choice: Ints) -> Floats:
-        """x with the sizes that are chosen (k,)."""
+        """The design x with the chosen sizes (k,) in it."""
         return self._with(self.sizes, x, choice)
 
     def paid(self, x: Floats, choice: Ints) -> Floats:
@@ -66,12 +66,12 @@ class Catalogued(NamedTuple):
 
     @property
     def choices(self) -> int:
-        """How many there are."""
+        """How many combinations of sizes there are."""
         return math.prod(len(sizes) for sizes in self.sizes)
 
 
 class Within:
-    """A problem within other bounds and with other linear rows; it counts evaluations."""
+    """A problem with narrower bounds and further linear rows; it counts evaluations."""
 
     def __init__(self, problem: Problem, counts: list[int], lower: Floats, upper: Floats, linear: LinearRows) -> None:
         self.lower, self.upper, self.linear = lower, upper, linear
@@ -91,7 +91,8 @@ class Within:
 
 @dataclass(order=True)
 class Node:
-    """A range of sizes for each variable: low to high (k,), both included, as numbers of sizes.
+    """A node of the branch-and-bound search: a range of sizes for each variable, low to high (k,), both included, as
+    numbers of sizes.
 
     bound: the optimum of the relaxation of the node above; number: of equal ones the first comes first. x: where the
     relaxation begins.
@@ -106,7 +107,7 @@ class Node:
 
 @dataclass
 class Found:
-    """What the search has found so far.
+    """What the search has found up to now.
 
     choice (k,), x (n,), objective: the best; None and infinite before there is one. nodes, evaluations: so far.
     bound: the least optimum of a relaxation that is open; the objective where none is. finished: whether no node is
@@ -143,7 +144,7 @@ def rows_for_sizes(rows: LinearRows, catalogued: Catalogued) -> LinearRows:
 
 
 class SizeSearch:
-    """A search that can be stopped and taken up again (`to_arrays`)."""
+    """A branch-and-bound search for sizes, which can be stopped and taken up again (`to_arrays`)."""
 
     def __init__(
         self,

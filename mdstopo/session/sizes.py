@@ -78,7 +78,7 @@ class Sizes:
         self.outcome = self._outcome(found, catalogued)
 
     def is_chosen(self, state: State) -> bool:
-        """Whether a state is that of the sizes chosen."""
+        """Whether a state belongs to the sizes that were chosen in the end."""
         return has_sizes(self.case, state)
 
     def choose(
@@ -150,7 +150,7 @@ class Sizes:
         return RunStatus.INTERRUPTED, "stopped on request while sizes were chosen; the best choice so far is saved"
 
     def part(self) -> Datasets:
-        """What a file keeps of the search, and before its end the best choice as the design."""
+        """The datasets that a file keeps of the search, and before its end the best choice as the design."""
         if self._search is None:  # of a run that is opened again: as it was
             return {} if self._before is None else _kept(self._before)
         found = self._search.found

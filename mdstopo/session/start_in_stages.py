@@ -27,7 +27,7 @@ STAGE, ROUND = "stage", "round"
 
 
 def stage_of(state: State) -> int:
-    """The stage that a state is in, from 0."""
+    """The number of the stage that a state is in, from 0."""
     column = state.history.info.get(STAGE)
     return int(column[-1]) if column else 0
 
@@ -53,12 +53,13 @@ def is_done(case: Case, state: State) -> bool:
 
 
 def has_sizes(case: Case, state: State) -> bool:
-    """Whether sizes from the case's catalogue have been chosen: this counts as one more stage, behind the last."""
+    """Whether sizes from the case's catalogue have been chosen in this state: that is one more stage, behind the
+    last."""
     return has_catalogue(case) and stage_of(state) >= stage_count(case)
 
 
 def furthest(states: "list[State | None]") -> "list[State | None]":
-    """The states that may be compared: None for those that are in an earlier stage than others.
+    """The states that may be compared with each other; None in the place of those in an earlier stage.
 
     Objectives of different powers are different functions.
     """

@@ -55,7 +55,7 @@ def run_in_workers(
     keep: Callable[[int, State], None],
     stop_requested: Callable[[], bool],
 ) -> None:
-    """Go every task; `keep` gets their states as they arrive, the last one of each always.
+    """Work on every task until its end; `keep` gets their states as they arrive, the last one of each always.
 
     pool: of `open_starts`. states: of all starts, which `keep` brings up to date.
 

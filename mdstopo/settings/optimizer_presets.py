@@ -51,7 +51,7 @@ DEFAULT_OPTIMIZER = "gsao"
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """All settings of one run, resolved.
+    """All settings of an optimiser for one run.
 
     max_iterations: evaluations after the first one. tolerance: bound on the projected KKT residual relative
     to the largest |dU/dalpha|. options: every name of `OPTIONS`; build it with `resolve`. optimizer: which one, a name

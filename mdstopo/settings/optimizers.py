@@ -10,7 +10,7 @@ from mdstopo.settings.optimizer_presets import DEFAULT_OPTIMIZER, PRESETS
 
 
 class OptimizerKind(NamedTuple):
-    """An optimiser.
+    """What is declared of an optimiser: its name, where its code is, and what it can do.
 
     name: as case files have it; doc: a sentence for the case reference. made_by: module:class, called with the problem
     and `Settings`; states: module:class of its states, derived from `optimizer.state.State`. options, presets: names of
@@ -47,5 +47,5 @@ OPTIMIZERS: dict[str, OptimizerKind] = {
 
 
 def names(_: bool = False) -> dict[str, str]:
-    """The optimisers with what they are."""
+    """The optimisers by their names, with what they are."""
     return {kind.name: kind.doc for kind in OPTIMIZERS.values()}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class ScalarisationKind(NamedTuple):
-    """A way to make one U of several objectives.
+    """What is declared of a way to combine several objectives to one number U.
 
     name: as case files and `--method` have it; doc: a formula or a sentence for the case reference. made_by:
     module:class, derived from `optimizer.scalarisation.Formula`. in_cases: whether a case may name it; else it is for
@@ -57,5 +57,5 @@ def names() -> dict[str, str]:
 
 
 def taking_exponent() -> list[str]:
-    """The ways that have an exponent."""
+    """The names of the ways to which an exponent belongs."""
     return [kind.name for kind in SCALARISATIONS.values() if kind.takes_exponent]

@@ -6,9 +6,9 @@ def ignore(_: object) -> None:
 
 
 def ignore_state(_index: int, _state: object) -> None:
-    """Take a state and do nothing with it."""
+    """A callback that does nothing with a state."""
 
 
 def never() -> bool:
-    """Never ask for a stop."""
+    """A question whether to stop, answered with no."""
     return False

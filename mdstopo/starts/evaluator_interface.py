@@ -58,11 +58,12 @@ MakeEngine = Callable[[Case], Engine]
 
 
 def even(case: Case) -> Scalarisation | None:
-    """Equal weights of raw values: a U to get ready with, which needs no utopia. None for one objective."""
+    """A scalarisation with equal weights of raw values, which needs no utopia, to load kernels with. None for one
+    objective."""
     count = len(case.objectives)
     return Scalarisation(SUM, np.full(count, 1.0 / count)) if count > 1 else None
 
 
 def problem_of(engine: Engine, scalarisation: Scalarisation | None) -> Problem:
-    """What the optimiser sees."""
+    """The optimisation problem that an evaluator of a case is."""
     return engine.problem() if scalarisation is None else engine.problem(scalarisation)

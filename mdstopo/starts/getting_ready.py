@@ -44,7 +44,7 @@ def get_ready(
 
 
 def meet(case: Case, size: int, competes: bool = False) -> None:
-    """Load the kernels that the optimiser calls where there are so many variables, and where their rows compete."""
+    """Load the kernels of the optimiser for so many variables, and for rows that compete where they do."""
     optimizer = make_optimizer(case, _Toy(size, competes))
     state = optimizer.start()
     if state.running:
@@ -52,7 +52,7 @@ def meet(case: Case, size: int, competes: bool = False) -> None:
 
 
 def motions(case: Case, engine: Engine, design: Floats) -> dict[str, Motion]:
-    """The motion of a design in each load case."""
+    """Compute the motion of a design in each load case."""
     return {each.name: engine.trajectory(design, each.name) for each in case.load_cases}
 
 

@@ -83,8 +83,8 @@ def all_found(states: Sequence[State | None]) -> bool:
 
 
 def came_to(states: Sequence[State | None]) -> tuple[int, int]:
-    """How many starts had come to an optimum at the first quota, or were on their way to one, and to how many distinct
-    ones; the same at any later time."""
+    """How many starts had come to an optimum, or near one, at the first quota, and to how many distinct optima; the
+    same at any later time."""
 
     def is_known(index: int) -> bool:
         state = states[index]
@@ -176,7 +176,7 @@ def twin_of(state: State, others: Sequence[tuple[int, State]]) -> int:
 
 
 def lags(state: State, best: State, tolerance: float) -> bool:
-    """Whether a start is far behind the best, and nothing says that it will not be: U does not fall fast."""
+    """Whether a start is far behind the best and its U does not fall fast enough to change that."""
     if state.best_violation > tolerance:
         left = best.best_plain if best.best_violation > tolerance else 0.0
         return state.best_plain > left + LAGGING
@@ -243,7 +243,7 @@ def _taken_up(state: State) -> State:
 
 
 def near(state: State, best: State, tolerance: float) -> bool:
-    """Whether a start may still come to be the best: it violates limits, as yet, or its U is not far above."""
+    """Whether a start may still become the best: it does not keep all limits yet, or its U is not far above."""
     if best.best_violation > tolerance or state.best_violation > tolerance:
         return True
     return state.best_objective - best.best_objective <= BEHIND * abs(best.best_objective)
@@ -259,7 +259,7 @@ def falls(state: State, lately: int = LATELY) -> bool:
 
 
 def same(one: State, other: State) -> bool:
-    """Whether two starts have come to one optimum."""
+    """Whether two starts have come to the same optimum."""
     if not abs(one.best_objective - other.best_objective) <= SAME_VALUE * abs(other.best_objective):
         return False
     return float(np.abs(one.best_alpha - other.best_alpha).mean()) <= SAME_DESIGN

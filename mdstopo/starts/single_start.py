@@ -46,7 +46,7 @@ def make_optimizer(case: Case, problem: Problem, family: Family = Family.STATED)
 
 
 def first_design(case: Case, problem: Problem, initial: Floats | None) -> tuple[Floats, Floats]:
-    """The x at which the first start begins, and the nearest one to it that keeps bounds and volume rows.
+    """The x at which the first start is to begin, and the nearest x to it that keeps bounds and volume rows.
 
     initial: a design (alpha, or with the values of variables), whose nearest x is taken. Raises CaseError where there
     is none.
@@ -73,7 +73,7 @@ def replaced(stated: Floats, nearest: Floats) -> str:
 
 
 def unshared(case: Case, initial: Floats | None) -> str:
-    """The notice that alphas which are one in the case differ in the first design; empty where they do not."""
+    """A notice that the first design has different alphas where the case has one; empty where it has not."""
     space = case.space
     if not (case.shared or case.mirrored):
         return ""
@@ -144,8 +144,8 @@ def run_start(
 
 
 def soften(settings: Settings, problem: Problem, first: Floats | None, stop: Stop) -> State | None:
-    """The end of a short run with a quarter of the strengths, which ends, too, where so weak members cannot keep the
-    limits; None where it was stopped."""
+    """The end of a short run with a quarter of the members' strength, after which a start goes on; None where it was
+    stopped."""
     optimizer = make(problem.softened(SOFT_STRENGTH), settings)  # type: ignore[attr-defined]
     state = optimizer.start(first)
     while state.running and not state.is_restoring and state.iteration < SOFT_ITERATIONS:
@@ -156,7 +156,7 @@ def soften(settings: Settings, problem: Problem, first: Floats | None, stop: Sto
 
 
 def counted(state: State, before: int) -> State:
-    """A first state, behind so many evaluations of another problem."""
+    """A first state, to whose evaluations those of another problem are added."""
     if before:
         state.evaluations += before
         state.history.evaluations[:] = [count + before for count in state.history.evaluations]

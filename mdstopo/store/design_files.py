@@ -82,7 +82,7 @@ def _finite(path: Path, values: NDArray[np.float64], what: str) -> NDArray[np.fl
 
 
 def place_of(text: str) -> tuple[Path, int | None]:
-    """`front.h5:3` is point 3 of a front."""
+    """The file and the point of a front that a text names: `front.h5:3` is point 3."""
     found = re.fullmatch(r"(.+\.(?:h5|hdf5)):(\d+)", text, re.IGNORECASE)
     if found is None or Path(text).exists():
         return Path(text), None

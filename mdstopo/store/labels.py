@@ -19,7 +19,8 @@ Datasets = dict[str, Value]
 
 @dataclass
 class Labels:
-    """extra: datasets that only are scales; scales: by path, the scale of each dimension; units: by path."""
+    """Labels of the datasets in a file. extra: datasets that only are scales; scales: by path, the scale of each
+    dimension; units: by path."""
 
     extra: Datasets = field(default_factory=dict)
     scales: dict[str, tuple[str, ...]] = field(default_factory=dict)

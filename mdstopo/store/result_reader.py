@@ -55,17 +55,17 @@ class ResultView:
 
     @property
     def case_text(self) -> str:
-        """The case file as it was read."""
+        """The text of the case file as it was read."""
         return self.text("case")
 
     @property
     def alpha(self) -> NDArray[np.float64]:
-        """The best design so far, (N,)."""
+        """(N,) alpha of the best design so far."""
         return np.asarray(self.array("design/alpha"), dtype=np.float64)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the run warned of."""
+        """The warnings of the run, in words."""
         return self.lines("warnings")
 
     def array(self, path: str) -> Array:

@@ -21,7 +21,8 @@ _PIECE = 1 << 20
 
 
 class Seal(NamedTuple):
-    """whole: whether the file is as it was written, None where nothing tells; head: its JSON, empty without a seal."""
+    """The seal of a file. whole: whether the file is as it was written, None where nothing tells; head: its JSON, empty
+    without a seal."""
 
     whole: bool | None
     head: bytes

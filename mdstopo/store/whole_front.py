@@ -60,7 +60,8 @@ def came_by(point: int, iterate: int, names: Sequence[str]) -> str:
 
 
 def design_of(view: ResultView, point: int) -> tuple[Array, dict[str, Array]] | None:
-    """alpha (N,) of a point of a front, and its values of variables by name; None where the file has no such point."""
+    """The design of a point of a front: alpha (N,), and values of variables by name; None where the file has no such
+    point."""
     prefix, row = "pareto", point
     count = len(view.arrays.get("pareto/alpha", ()))
     if point >= count:

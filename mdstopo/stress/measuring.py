@@ -77,7 +77,7 @@ def differentiated(formula: Callable[[Any], Any], at: Floats) -> tuple[float, Fl
 
 
 def body(case: "Case", name: str) -> int:
-    """Where a body's x, y, psi begin."""
+    """The place in the coordinates at which those of a body begin: x, y, psi."""
     return 3 * [each.name for each in case.bodies].index(name)
 
 
@@ -87,7 +87,7 @@ def spring(start: list[float], to: str, at: list[float], **law: Any) -> dict[str
 
 
 def ball(x: float = 1.0, y: float = 0.0, **more: Any) -> dict[str, Any]:
-    """A body of unit mass and inertia."""
+    """The entry of a body of unit mass and inertia in a case."""
     return {"mass": 1.0, "inertia": 1.0, "position": [x, y], **more}
 
 

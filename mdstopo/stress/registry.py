@@ -29,7 +29,7 @@ FAMILIES: "Mapping[str, str]" = MappingProxyType(
 
 @cache
 def scenes_of(family: str) -> "tuple[Scene, ...]":
-    """The scenes of a family."""
+    """The scenes of a family, by the family's name."""
     return tuple(import_module(f"mdstopo.stress.scenes_of_{family}").scenes())
 
 

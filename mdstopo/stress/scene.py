@@ -37,7 +37,7 @@ class Scene:
 
     @property
     def expected(self) -> str:
-        """How it has to end."""
+        """How the scene has to end, in words."""
         return "refused" if self.refusal else "right"
 
     @property
@@ -47,7 +47,7 @@ class Scene:
 
     @property
     def text(self) -> str:
-        """The case as a file; JSON is YAML."""
+        """The case as the text of a file (JSON, which is YAML too)."""
         return json.dumps({"format": 1, "title": self.checks, **self.data}, indent=2) + "\n"
 
 
@@ -64,6 +64,6 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        """Whether it ended as it had to."""
+        """Whether the scene ended as it had to."""
         named = all(word in self.message for word in self.scene.refusal)
         return self.outcome == self.scene.expected and named

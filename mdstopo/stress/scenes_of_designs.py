@@ -116,7 +116,7 @@ def _twins(case: "Case") -> float:
 
 
 def idle(**more: Any) -> dict[str, Any]:
-    """Nothing pulls: the stored energy is zero throughout."""
+    """A scene in which no member is strained: the stored energy is zero throughout."""
     solver = more.pop("solver", {})
     scene = parallel(1.0, 0.5, 0.01, **solver)
     scene.pop("loads")
@@ -171,12 +171,12 @@ def _zero_response(case: "Case") -> float:
 def resting(**solver: Any) -> dict[str, Any]:
     """A body at rest, with every way to reduce a response."""
     of = {"body": "ball"}
-    looked: dict[str, Any] = {
+    objectives: dict[str, Any] = {
         name: {"response": {name: of}, "over_time": over}
         for name, over in (("displacement", "max"), ("velocity", "rms"), ("acceleration", "max"), ("angle", "max_abs"))
     }
-    looked["force"] = {"response": {"member_force": {"group": "kept"}}, "over_time": "max"}
-    return idle(objectives=looked, combine={"weights": dict.fromkeys(looked, 1)}, solver=solver)
+    objectives["force"] = {"response": {"member_force": {"group": "kept"}}, "over_time": "max"}
+    return idle(objectives=objectives, combine={"weights": dict.fromkeys(objectives, 1)}, solver=solver)
 
 
 def scenes() -> list[Scene]:

@@ -20,7 +20,7 @@ def bar(start: list[float], end: list[float], **more: Any) -> dict[str, Any]:
 
 
 def pin(name: str, first: str, second: str, at: list[float]) -> dict[str, Any]:
-    """A revolute joint."""
+    """The entry of a revolute joint in a case."""
     return {"name": name, "type": "revolute", "bodies": [first, second], "at": at}
 
 

@@ -17,7 +17,7 @@ WHEN = 0.3
 
 
 def peak(rate: float) -> float:
-    """f0 of a pulse with that rate."""
+    """The peak force f0 of a pulse with a given rate."""
     return float(IMPULSE * np.sqrt(rate / np.pi))
 
 

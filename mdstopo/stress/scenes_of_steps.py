@@ -71,7 +71,7 @@ def _whirling(case: "Case") -> float:
 
 
 def scenes() -> list[Scene]:
-    """Steps and tolerances."""
+    """Scenes that are about steps and tolerances."""
     found = []
     coarse = {"integrator": "generalized_alpha"}
     for name, words, data, measure in (

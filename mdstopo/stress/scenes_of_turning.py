@@ -100,7 +100,7 @@ def _value(case: "Case", exact: float) -> float:
 
 
 def scenes() -> list[Scene]:
-    """Free, jointed and driven turns."""
+    """Scenes whose bodies turn many times: free, jointed and driven ones."""
     found = [
         Scene(
             f"turns-circle-{integrator}".replace("_", "-"),

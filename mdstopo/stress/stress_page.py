@@ -8,7 +8,7 @@ from mdstopo.stress.scene import Outcome
 
 
 def markdown_of(outcomes: Sequence[Outcome]) -> str:
-    """A table a family, and the machine."""
+    """The page of results: a table for each family of scenes, and the machine."""
     parts = []
     by_name = {each.scene.name: each for each in outcomes}
     for family, words in FAMILIES.items():

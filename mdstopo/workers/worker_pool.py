@@ -41,14 +41,14 @@ class StoppedError(Exception):
 
 
 class Parent(Protocol):
-    """What a task may ask of the process that gave it."""
+    """What a task in a worker may ask of the process that gave it the task."""
 
     def stopped(self) -> bool:
         """Whether the task is to end as soon as it can."""
         ...
 
     def keep(self, state: Callable[[], object]) -> None:
-        """How far the task has come; `state` is called, and what it returns is sent, now and then."""
+        """Report how far the task has come; `state` is called now and then, and what it returns is sent."""
         ...
 
 
@@ -102,7 +102,7 @@ def _ignore(_words: str) -> None:
 
 
 class WorkerPool:
-    """At most so many worker processes, started when there is something to do; a context manager."""
+    """A context manager with at most so many worker processes, started when there is something to do."""
 
     def __init__(
         self,

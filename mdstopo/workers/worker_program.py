@@ -57,7 +57,7 @@ class ToParent:
         self.begin()
 
     def begin(self) -> None:
-        """A task begins: nothing is kept of it."""
+        """Begin a task: nothing is kept of the one before."""
         self._latest = None
         self._saver = self._timer(self.flush)
 
@@ -73,7 +73,7 @@ class ToParent:
             self.send("kept", latest())
 
     def send(self, kind: str, what: Any) -> None:
-        """Tell the parent."""
+        """Send a message of some kind to the parent process."""
         self._output.write(pickle.dumps((kind, what)))
         self._output.flush()
 

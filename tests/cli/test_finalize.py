@@ -16,7 +16,7 @@ from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.yaml_text import text_of
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
-from mdstopo.finalize.document import _looking, content_of, final_content
+from mdstopo.finalize.document import _versions, content_of, final_content
 from mdstopo.finalize.equilibria import _Distance
 from mdstopo.finalize.finalize_design import finalize, ready
 from mdstopo.finalize.keep import chosen, places, restricted
@@ -517,6 +517,6 @@ def test_an_expression_looks_at_the_group_that_its_member_has_become() -> None:
         return {"response": {"expression": {"formula": "f*e", "of": of}}, "over_time": "mean"}
 
     groups = {"tie": ["tie_0"], "net": []}
-    assert _looking(looking("tie"), groups) == [looking("tie_0")]
-    assert _looking(looking("net"), groups) == []
-    assert _looking(looking("other"), groups) == [looking("other")]
+    assert _versions(looking("tie"), groups) == [looking("tie_0")]
+    assert _versions(looking("net"), groups) == []
+    assert _versions(looking("other"), groups) == [looking("other")]

@@ -25,7 +25,9 @@ JOINED = [
     ["tests/general/test_orders.py", "-k", "classical"],
     ["tests/optimizer/test_scalarisation.py"],
     ["tests/robust/test_measures.py", "-k", "slopes"],
-    ["tests/robust/test_samples.py", "-k", "interval"],
+    ["tests/robust/test_samples.py", "-k", "interval or distribution"],
+    ["tests/general/test_reductions.py"],
+    ["tests/fit/test_statistics.py", "-k", "loss"],
     ["tests/docs/test_generated.py"],
 ]
 

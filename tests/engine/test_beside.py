@@ -11,7 +11,7 @@ from mdstopo.engine import Evaluator
 
 def test_it_ends_with_an_evaluator_that_is_never_used(monkeypatch):
     monkeypatch.setattr(warm, "is_compiled", lambda _integrator: False)
-    beside = warm.Beside("gauss")
+    beside = warm.BackgroundCompiler("gauss")
     child = beside._child
     assert child.poll() is None
     del beside
@@ -24,7 +24,7 @@ def test_what_looks_back_at_steps_is_compiled_without_asking_which_steps_serve(m
         raise AssertionError("the other process would wait for the steps to be compiled")
 
     monkeypatch.setattr("mdstopo.general.stiffness.held_short", simulate)
-    evaluator = Evaluator(mdstopo.load_case("restraint"), beside=False)
+    evaluator = Evaluator(mdstopo.load_case("restraint"), in_background=False)
     evaluator.compile_responses()
     with pytest.raises(AssertionError, match="would wait"):
         evaluator.driver(next(iter(evaluator.scenes)))

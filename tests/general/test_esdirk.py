@@ -167,12 +167,12 @@ def test_bodies_at_rest_on_stiff_springs_are_followed_in_long_steps() -> None:
 
 def test_auto_takes_it_where_explicit_steps_have_no_hope_to_reach_the_end() -> None:
     text = PENDULUM.replace("DAMPING", "5e4").replace("{end: 1}", "{end: 100}")
-    chosen = Evaluator(read_case(text, overrides={"solver.tolerance": 1e-5}), beside=False)
+    chosen = Evaluator(read_case(text, overrides={"solver.tolerance": 1e-5}), in_background=False)
     assert chosen.integrator == "esdirk"
 
 
 def test_auto_takes_it_where_stability_holds_most_explicit_steps_short() -> None:
-    chosen = {damping: Evaluator(pendulum(damping, tolerance=1e-5), beside=False) for damping in (500.0, 5e4)}
+    chosen = {damping: Evaluator(pendulum(damping, tolerance=1e-5), in_background=False) for damping in (500.0, 5e4)}
     assert chosen[500.0].integrator == "runge_kutta"
     assert chosen[5e4].integrator == "esdirk"
     assert "stability holds" in chosen[5e4].integrator_reason
@@ -183,7 +183,7 @@ def test_auto_takes_it_where_stability_holds_most_explicit_steps_short() -> None
 
 def test_steps_for_integrals_that_are_too_many_end_with_a_status(monkeypatch: pytest.MonkeyPatch) -> None:
     """The motion alone may be computed: it was taken for all, and no value was found."""
-    evaluator = Evaluator(pendulum(500.0, integrator="esdirk", tolerance=1e-4), beside=False)
+    evaluator = Evaluator(pendulum(500.0, integrator="esdirk", tolerance=1e-4), in_background=False)
     driver = evaluator.driver(next(iter(evaluator.scenes)))
     found = driver.evaluate(np.full(2, 0.5), False)
     monkeypatch.setattr(driver, "evaluate", lambda *_: found._replace(status=Status.STEP_LIMIT))

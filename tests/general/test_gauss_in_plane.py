@@ -207,7 +207,7 @@ def test_auto_takes_explicit_or_implicit_steps_where_dampers_hold_windows_short(
     chosen = {}
     for damping in (1.0, 500.0, 1e6):
         text = yaml.safe_dump({**DAMPED, "solver": {"tolerance": 1e-5}}).replace("damping: 1", f"damping: {damping}")
-        chosen[damping] = Evaluator(read_case(text), beside=False)
+        chosen[damping] = Evaluator(read_case(text), in_background=False)
     assert chosen[1.0].integrator == "gauss"
     assert chosen[500.0].integrator == "runge_kutta"
     assert "windows of collocation short" in chosen[500.0].integrator_reason

@@ -135,3 +135,34 @@ def test_no_random_design_is_beyond_the_bound(seed, monkeypatch):
     for each in found:
         assert each.bound is None or each.bound <= each.best
     assert any(each.bound is not None and each.bound > 0.0 for each in found)
+
+
+def named(what, **sections):
+    """A sled's load in a tie of which something follows from a name that is a design variable."""
+    scene = sled([[0, 0], [0.1, 30], [0.2, 0]])
+    scene["define"] = {"k": 4000}
+    scene["design"] = {"variables": {"size": {"of": "define.k", "lower": 1000, "upper": 9000}}}
+    scene["constraints"] = [peak("displacement", relative_to="sled", limit=0.1)]
+    if what == "mass":
+        scene["bodies"]["load"] |= {"mass": "=k / 400"}
+    else:
+        scene["members"]["tie"]["law"] = what
+    return case_of(**scene, **sections)
+
+
+def test_a_name_that_decides_numbers_of_laws_alone_leaves_the_bound_as_it_is():
+    plain = sled([[0, 0], [0.1, 30], [0.2, 0]])
+    plain["constraints"] = [peak("displacement", relative_to="sled", limit=0.1)]
+    expected = bounds(case_of(**plain))["G"]
+    found = bounds(named({"type": "spring", "stiffness": "=k", "damping": "=k / 200"}))["G"]
+    assert expected.value is not None
+    assert found.value == pytest.approx(expected.value, rel=1e-9)
+    # nothing is certain of a law that follows: the limit of its force is not used
+    limited = bounds(named({"type": "actuator", "proportional": 100, "limit": "=k / 4000"}))["G"]
+    assert limited.value == pytest.approx(expected.value, rel=1e-9)
+
+
+def test_a_name_that_decides_a_mass_has_no_bound_and_says_why():
+    found = bounds(named("mass"))["G"]
+    assert found.value is None
+    assert "more than numbers of laws follows" in found.why

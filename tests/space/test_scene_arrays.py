@@ -297,7 +297,7 @@ def test_a_scene_far_away_is_computed_from_a_point_of_its_own() -> None:
 
 def test_the_general_family_computes_every_case_in_space() -> None:
     case = read_case(HULL)
-    engine = Evaluator(case, beside=False)
+    engine = Evaluator(case, in_background=False)
     assert engine.beyond == "bodies in space"
     assert engine.integrator == "gauss"
     assert isinstance(next(iter(engine.scenes.values())), GeneralScene)

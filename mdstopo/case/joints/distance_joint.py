@@ -28,7 +28,7 @@ class DistanceJoint(Joint):
 
     @classmethod
     def own_values(cls, stated: Stated, reading: Reading) -> dict[str, Any] | None:
-        """The length, that of the start; none is a mistake."""
+        """The length (m): the distance of the two points at the start. Where that is zero, a mistake is noted."""
         length = math.hypot(stated.second[0] - stated.first[0], stated.second[1] - stated.first[1])
         if not length > 0.0:
             reading.mistake(inside(stated.fields.path, "at"), "the two points coincide; a link needs a length")
@@ -36,5 +36,5 @@ class DistanceJoint(Joint):
         return {"length": length}
 
     def row(self) -> dict[int, float]:
-        """The length."""
+        """Numbers of its own for the kernels, by their place in the parameters: the length (m)."""
         return {7: self.length}

@@ -40,7 +40,8 @@ class Joint(Value):
     type: the word of the YAML key ``type``; doc: a sentence for the case reference; keys: beside type, name and bodies.
     kernels: the module with the joint's `KERNELS` (`mechanics.joints.joint_kernels`). keeps_angle: whether the bodies
     do not turn against each other; keeps_point: whether its points stay together. is_link: whether they lie apart, as
-    the ends of a link do.
+    the ends of a link do. turns_about_normal: whether the joint of this type in space has an axis, which is the normal
+    of a plane that is lifted there.
     index: its place in the file, from 0; name: as stated, else the index as text.
     bodies: first and second; at_first, at_second: the joint's point on each, in body coordinates.
     """
@@ -52,6 +53,7 @@ class Joint(Value):
     keeps_angle: ClassVar[bool] = False
     keeps_point: ClassVar[bool] = False
     is_link: ClassVar[bool] = False
+    turns_about_normal: ClassVar[bool] = False
 
     name: str
     index: int
@@ -67,15 +69,16 @@ class Joint(Value):
 
     @property
     def slide(self) -> Pair | None:
-        """The direction, a unit vector in the first body's coordinates, in which alone its point may move there."""
+        """The direction in which a point of the second body slides in the first, a unit vector in the first body's
+        coordinates; None where it does not."""
         return None
 
     def row(self) -> dict[int, float]:
-        """Numbers of its own for the kernels, by their place in the parameters: 4 to 7."""
+        """Numbers of its own for the kernels, by their place in the joint's parameters: places 4 to 7."""
         return {}
 
 
 def record_of(joint: type[Joint]) -> Record:
-    """The joint as the case file has it."""
+    """The keys of a joint in the case file, from its class."""
     tag = Key("type", Word((joint.type,)), "which joint it is", required=True)
     return Record(f"a {joint.type} joint", (tag, _NAME, BODIES, *joint.keys), doc=joint.doc)

@@ -20,7 +20,7 @@ from mdstopo.case.words import inside
 
 @frozen(kw_only=True)
 class SphericalJoint(SpatialJoint):
-    """The two points coincide."""
+    """A ball joint: a point of each body coincides with one of the other."""
 
     type: ClassVar[str] = "spherical"
     doc: ClassVar[str] = "A ball: a point of the one body and a point of the other stay together; 3 rows."
@@ -31,7 +31,7 @@ class SphericalJoint(SpatialJoint):
 
 @frozen(kw_only=True)
 class SpatialRevoluteJoint(SpatialJoint):
-    """The two points and the two axes coincide."""
+    """A hinge: a point and an axis of each body coincide with those of the other."""
 
     type: ClassVar[str] = "revolute"
     doc: ClassVar[str] = "A hinge: the bodies share a point and an axis, about which they turn; 5 rows."
@@ -58,7 +58,7 @@ class UniversalJoint(SpatialJoint):
     def triads(
         cls, axes: tuple[FloatArray, FloatArray] | None, stated: Stated, reading: Reading
     ) -> tuple[FloatArray, FloatArray] | None:
-        """See `SpatialJoint`; axes on one line are a mistake."""
+        """The axes of the joint in both bodies; see `SpatialJoint.triads`. Two axes on one line are a mistake."""
         assert axes is not None
         first, second = axes
         if parallel(first, second):
@@ -152,7 +152,7 @@ class SpatialDistanceJoint(SpatialJoint):
 
     @classmethod
     def further_values(cls, stated: Stated, reading: Reading) -> dict[str, Any] | None:
-        """The length, that of the start; none is a mistake."""
+        """The length (m): the distance of the two points at the start. Where that is zero, a mistake is noted."""
         length = math.hypot(*(np.array(stated.second) - np.array(stated.first)).tolist())
         if not length > 0.0:
             reading.mistake(inside(stated.fields.path, "at"), "the two points coincide; a link needs a length")

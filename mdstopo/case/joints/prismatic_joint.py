@@ -29,7 +29,7 @@ class PrismaticJoint(Joint):
 
     @classmethod
     def own_values(cls, stated: Stated, reading: Reading) -> dict[str, Any] | None:
-        """The axis in the first body's coordinates."""
+        """The values of the joint from its keys: its axis in coordinates of the first body."""
         axis = stated.fields["axis"]
         longest = max(abs(axis[0]), abs(axis[1]))
         x, y = axis[0] / longest, axis[1] / longest
@@ -39,10 +39,10 @@ class PrismaticJoint(Joint):
         return {"axis": (c * x + s * y, c * y - s * x)}
 
     def row(self) -> dict[int, float]:
-        """The normal of the axis."""
+        """Numbers of its own for the kernels, by their place in the parameters: the normal of the axis."""
         return {4: -self.axis[1], 5: self.axis[0]}
 
     @property
     def slide(self) -> Pair:
-        """The axis."""
+        """The direction in which the bodies slide: the axis of the joint."""
         return self.axis

@@ -11,7 +11,7 @@ from mdstopo.case.value import frozen
 
 @frozen(kw_only=True)
 class RevoluteJoint(Joint):
-    """The two points coincide."""
+    """A pin joint: a point of each body coincides with one of the other."""
 
     type: ClassVar[str] = "revolute"
     doc: ClassVar[str] = (
@@ -22,3 +22,4 @@ class RevoluteJoint(Joint):
     )
     kernels: ClassVar[str] = "mdstopo.mechanics.joints.revolute"
     keeps_point: ClassVar[bool] = True
+    turns_about_normal: ClassVar[bool] = True

@@ -24,12 +24,12 @@ _TWO_AXES = ByShape(
 
 
 def at(doc: str) -> Key:
-    """The key of a joint's point."""
+    """The key for a joint's point, described by `doc`."""
     return Key("at", POINT, f"{doc}, or each body's own, which may then misfit", required=True, unit="m")
 
 
 def axis(name: str, doc: str) -> Key:
-    """The key of a joint's direction at the start."""
+    """A key for a direction of a joint, as it is at the start, described by `doc`."""
     return Key(name, _AXIS, f"{doc} at the start, of any length, or each body's own", required=True)
 
 

@@ -37,7 +37,7 @@ LAWS: dict[str, type[Law]] = {
 
 
 def enter_law(law: Any) -> Record:
-    """Take in a law of another distribution; TypeError where it is none, or its word is taken."""
+    """Add the law of another distribution to the known ones; TypeError where it is no law, or its word is taken."""
     if not (isinstance(law, type) and issubclass(law, Law)):
         raise TypeError(f"found {law!r}, needed is a subclass of Law")
     if LAWS.setdefault(law.type, law) is not law:

@@ -38,21 +38,21 @@ class ActuatorLaw(Law):
     )
 
     def row(self) -> list[float]:
-        """kp, kd, target, limit, which is 0 where there is none; all 0 where it is clipped to nothing."""
+        """Parameters for the kernels: gains kp and kd, target, and limit (0: none); all 0 where the limit is zero."""
         if self.limit == 0.0:
             return []
         return [self.proportional, self.derivative, self.target, 0.0 if self.limit is None else self.limit]
 
     @property
     def is_smooth(self) -> bool:
-        """A limit has a kink."""
+        """Whether its force has no kinks: only where it has no limit."""
         return self.limit is None
 
     @property
     def holds(self) -> bool:
-        """A damper alone holds nothing."""
+        """Whether it may have a force at rest: a damper alone has none."""
         return self.proportional != 0.0
 
     def strength(self, ranges: Ranges) -> float | None:
-        """The limit, where there is one."""
+        """The largest force at alpha = 1 (N): its limit; None where it has none."""
         return None if self.limit is None else largest(ranges("limit"))

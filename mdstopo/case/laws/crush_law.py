@@ -39,18 +39,18 @@ class CrushLaw(Law):
     )
 
     def row(self) -> list[float]:
-        """Stiffness, plateau, gap, side."""
+        """Parameters for the kernels: stiffness, plateau, gap, and the side on which it is crushed."""
         return [self.stiffness, self.force, self.gap, sign_of(self.side)]
 
     def strength(self, ranges: Ranges) -> float:
-        """The plateau."""
+        """The largest force at alpha = 1 (N): that of the plateau."""
         return largest(ranges("force"))
 
     def side_of_force(self, ranges: Ranges) -> int:
-        """The side on which it is crushed."""
+        """1 where it is crushed by elongation and only pulls, -1 where it only pushes."""
         del ranges
         return int(sign_of(self.side))
 
     def slack(self, ranges: Ranges, length: FloatArray) -> FloatArray:
-        """By how much the length has to change until the gap is used up, (M,) m."""
+        """By how much the length of members has to change until the gap is closed, (M,) m."""
         return slack_before(self.side, self.free_length, ranges, length)

@@ -24,5 +24,5 @@ class CubicLaw(Law):
 
     @property
     def is_smooth(self) -> bool:
-        """Of elongation, rate and time alone, without a kink."""
+        """Whether its force has no kinks: always."""
         return True

@@ -12,7 +12,8 @@ from mdstopo.case.value import frozen, stated
 
 @frozen(kw_only=True)
 class CurveLaw(Law):
-    """f: monotone cubic (PCHIP) through ``curve`` (n, 2), rows [Delta, f] of rising Delta, linear outside."""
+    """A force that a curve gives by elongation: monotone cubic (PCHIP) through ``curve`` (n, 2), rows [Delta, f] of
+    rising Delta, linear outside."""
 
     type: ClassVar[str] = "curve"
     kind: ClassVar[str] = "passive"

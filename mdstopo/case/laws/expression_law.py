@@ -28,10 +28,10 @@ _FORMULAS = ("force", "energy", "damping")
 
 @frozen
 class Parameters(Value):
-    """Numbers by names that formulas use."""
+    """The kind of a mapping from names that formulas use to numbers."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """dict of numbers, or BAD."""
+        """Numbers by their names, or BAD with a mistake noted."""
         if node.kind != MAPPING:
             reading.mistake(path, f"found {found(node)}, allowed is a mapping from names to numbers", node)
             return BAD
@@ -52,7 +52,7 @@ class Parameters(Value):
         return values if good else BAD
 
     def schema(self) -> Schema:
-        """object of numbers."""
+        """The JSON Schema: numbers by their names."""
         return {
             "type": "object", "propertyNames": {"pattern": f"^{WORD.pattern}$"}, "maxProperties": MOST_PARAMETERS,
             "additionalProperties": NUMBER.schema(),
@@ -105,35 +105,35 @@ class OfFormulas(Law):
 
     @property
     def values(self) -> dict[str, float]:
-        """The parameters."""
+        """The values of the parameters that the formulas use."""
         return {word: getattr(self, word) for word in names_of(type(self))}
 
     @property
     def formulas(self) -> tuple[str | None, str | None, str | None]:
-        """Force, energy, damping."""
+        """The formulas that the case states: force, energy and damping."""
         return self.force, self.energy, self.damping
 
     @property
     def program(self) -> Program:
-        """The formulas with their derivatives."""
+        """The law's formulas with their derivatives, ready for kernels."""
         from mdstopo.formula.law_formulas import program  # most cases have no formulas
 
         return program(*self.formulas, names_of(type(self)))
 
     @property
     def too_large(self) -> str:
-        """Why the formulas are too large to be used; nothing where they are not."""
+        """Why the formulas are too large to be used; empty where they are not."""
         from mdstopo.formula.law_formulas import why_too_large  # most cases have no formulas
 
         return why_too_large(lambda: self.program.groups)
 
     @property
     def depends_on_rate(self) -> bool:
-        """Whether a formula of the force has the rate in it."""
+        """Whether a formula of the force has the rate of elongation in it."""
         return any("xd" in names_in(parse(text).root) for text in self.formulas if text is not None)
 
     def stated_times(self, factor: float) -> dict[str, Any]:
-        """The law times a factor, as the mapping of the case file."""
+        """The law multiplied by a factor, as a mapping of the case file."""
         stated: dict[str, Any] = {"type": self.type}
         for key, text in zip(_FORMULAS, self.formulas, strict=True):
             if text is not None:
@@ -150,7 +150,7 @@ class OfFormulas(Law):
 
 @functools.cache
 def class_with(names: tuple[str, ...]) -> type[OfFormulas]:
-    """The law with parameters of these names."""
+    """The class of expression laws whose parameters have these names."""
     fields = {word: stated(NUMBER, f"the parameter {word}", varies=True) for word in names}
     body = {"__annotations__": dict.fromkeys(names, "float"), "__module__": __name__, "__doc__": OfFormulas.__doc__}
     made: type[OfFormulas] = frozen(kw_only=True)(type("OfFormulas", (OfFormulas,), {**fields, **body}))
@@ -164,7 +164,7 @@ def names_of(law: type[Law]) -> tuple[str, ...]:
 
 
 def with_parameters(own: Mapping[str, Any], parameters: Mapping[str, float]) -> OfFormulas:
-    """The law with these formulas and parameters."""
+    """A copy of a law with these formulas and parameters."""
     values: dict[str, Any] = {**own, **parameters}
     return class_with(tuple(parameters))(**values)
 

@@ -50,19 +50,20 @@ class GapLaw(Law):
     clip: bool = stated(Flag(), "true: damping cannot reverse the force; false: Eq. 3 to the letter", default=False)
 
     def row(self) -> list[float]:
-        """Stiffness, damping, gap, side, clip."""
+        """Parameters for the kernels: stiffness, damping, gap, side, and whether damping cannot reverse the force."""
         return [self.stiffness, self.damping, self.gap, sign_of(self.side), float(self.clip)]
 
     def side_of_force(self, ranges: Ranges) -> int:
-        """Damping may reverse the force where clip does not hold it."""
+        """1 where it only pulls, -1 where it only pushes; 0 where damping may reverse the force, unless `clip` prevents
+        that."""
         return 0 if largest(ranges("damping")) > 0.0 and not self.clip else int(sign_of(self.side))
 
     def slack(self, ranges: Ranges, length: FloatArray) -> FloatArray:
-        """By how much the length has to change until the gap is used up, (M,) m."""
+        """By how much the length of members has to change until the gap is closed, (M,) m."""
         return slack_before(self.side, self.free_length, ranges, length)
 
     def force_at(self, stretch: FloatArray, rate: FloatArray) -> FloatArray:
-        """Eq. 3."""
+        """Force (N) by elongation (m) and rate (m/s) at alpha = 1 (Eq. 3)."""
         side = sign_of(self.side)
         force = self.stiffness * (side * stretch - self.gap) + self.damping * side * rate
         if self.clip:

@@ -22,5 +22,5 @@ class InerterLaw(Law):
 
     @property
     def holds(self) -> bool:
-        """At rest it has no force."""
+        """Whether it may have a force at rest: it has none."""
         return False

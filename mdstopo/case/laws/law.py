@@ -86,7 +86,7 @@ class Law(Value):
         return None
 
     def side_of_force(self, ranges: Ranges) -> int:
-        """1 where the law only pulls, -1 where it only pushes, 0 where neither is certain."""
+        """1 where members with the law only pull, -1 where they only push, 0 where neither is certain."""
         del ranges
         return 0
 
@@ -100,17 +100,17 @@ class Law(Value):
 
 
 def stiffness_key(doc: str = "k at alpha = 1", positive: bool = False) -> Any:
-    """A field: a stiffness that grows with the member."""
+    """A field of a law: a stiffness, which grows with the size of the member."""
     return stated(POSITIVE if positive else NOT_NEGATIVE, doc, unit="N/m", scales=True, varies=True)
 
 
 def damping_key() -> Any:
-    """A field: the damping c, which grows with the member."""
+    """A field of a law: the damping c, which grows with the size of the member."""
     return stated(NOT_NEGATIVE, "c at alpha = 1", unit="N s/m", default=0.0, scales=True, varies=True, of_rate=True)
 
 
 def free_length_key() -> Any:
-    """A field: the free length l0."""
+    """A field of a law: the free length l0, None for each member's initial length."""
     return stated(
         NOT_NEGATIVE,
         "l0, the length at which Delta = 0; 0: the force is along the member and grows with its length",
@@ -122,7 +122,8 @@ def free_length_key() -> Any:
 
 
 def side_key(tension: str, compression: str, doc: str, default: str) -> Any:
-    """A field: tension or compression, with what either means; `sign_of` is its parameter."""
+    """A field of a law: whether it acts in tension or in compression, with what either means; `sign_of` is its
+    parameter."""
     words = {"tension": tension, "compression": compression}
     order = sorted(words, key=lambda word: word != default)
     return stated(explained({word: words[word] for word in order}), doc, default=default)
@@ -170,12 +171,12 @@ def _numbers(law: Any) -> tuple[str, ...]:
 
 
 def largest(bounds: tuple[float, float]) -> float:
-    """The largest magnitude between two values."""
+    """The largest magnitude between two bounds."""
     return max(map(abs, bounds))
 
 
 def side_between(bounds: tuple[float, float]) -> int:
-    """1 where no value is negative, -1 where none is positive, else 0."""
+    """1 where no value between two bounds is negative, -1 where none is positive, else 0."""
     low, high = bounds
     return 1 if low >= 0.0 else (-1 if high <= 0.0 else 0)
 
@@ -190,7 +191,7 @@ def slack_before(side: str, free: float | None, ranges: Ranges, length: FloatArr
 
 
 def record_of(law: type[Law]) -> Record:
-    """The law as the case file has it."""
+    """The keys of a law in the case file, from the fields of its class."""
     tag = Key("type", Word((law.type,)), "which law it is", required=True)
     article = "an" if law.type[0] in "aeiou" else "a"
     keys = [

@@ -11,7 +11,7 @@ from mdstopo.case.value import frozen, stated
 
 @frozen(kw_only=True)
 class PulseLaw(Law):
-    """f = peak exp(-rate (t - time)^2) (Eq. 4)."""
+    """A pulse of force at a known time: f = peak exp(-rate (t - time)^2) (Eq. 4)."""
 
     type: ClassVar[str] = "pulse"
     kind: ClassVar[str] = "active"
@@ -24,13 +24,14 @@ class PulseLaw(Law):
 
     @property
     def is_smooth(self) -> bool:
-        """Of elongation, rate and time alone, without a kink."""
+        """Whether its force has no kinks: always."""
         return True
 
     def strength(self, ranges: Ranges) -> float:
-        """The peak."""
+        """The largest force at alpha = 1 (N): the peak of the pulse."""
         return largest(ranges("peak"))
 
     def side_of_force(self, ranges: Ranges) -> int:
-        """The sign of the peak; 0 where it may have both."""
+        """1 where the peak is positive and it only pulls, -1 where it only pushes; 0 where the peak may have both
+        signs."""
         return side_between(ranges("peak"))

@@ -28,14 +28,14 @@ class SpringLaw(Law):
 
     @property
     def is_smooth(self) -> bool:
-        """Of elongation, rate and time alone, without a kink."""
+        """Whether its force has no kinks: always."""
         return True
 
     @property
     def holds(self) -> bool:
-        """A damper alone holds nothing."""
+        """Whether it may have a force at rest: a damper alone has none."""
         return self.stiffness != 0.0 or self.preload != 0.0
 
     def force_at(self, stretch: FloatArray, rate: FloatArray) -> FloatArray:
-        """Eq. 2."""
+        """Force (N) by elongation (m) and rate (m/s) at alpha = 1 (Eq. 2)."""
         return self.stiffness * stretch + self.damping * rate + self.preload

@@ -12,7 +12,7 @@ from mdstopo.case.value import frozen, stated
 
 @frozen(kw_only=True)
 class TableLaw(Law):
-    """f: a table of time with one value a row."""
+    """A force that a table gives over time, with one value a row."""
 
     type: ClassVar[str] = "table"
     kind: ClassVar[str] = "active"
@@ -23,15 +23,15 @@ class TableLaw(Law):
 
     @property
     def is_smooth(self) -> bool:
-        """Of elongation, rate and time alone, without a kink."""
+        """Whether its force has no kinks: those of the table are in time, not in the elongation."""
         return True
 
     def strength(self, ranges: Ranges) -> float:
-        """The largest value."""
+        """The largest force at alpha = 1 (N): the largest magnitude in the table."""
         del ranges
         return float(abs(self.table.values).max())
 
     def side_of_force(self, ranges: Ranges) -> int:
-        """The sign of the values; 0 where they have both."""
+        """1 where all values are positive and it only pulls, -1 where it only pushes; 0 where there are both."""
         del ranges
         return side_between((float(self.table.values.min()), float(self.table.values.max())))

@@ -33,7 +33,7 @@ def _line(par, w, wd):
 
 @kernel
 def distance_rows(par, w, phi, jac):
-    """Phi and its slopes."""
+    """Phi of a distance joint, and its slopes Phi_q."""
     px, py, cx, cy = arms(par, w)
     x = w[3] + cx - w[0] - px
     y = w[4] + cy - w[1] - py
@@ -53,7 +53,7 @@ def distance_rows(par, w, phi, jac):
 
 @kernel
 def distance_gamma(par, w, wd, gamma):
-    """gamma: the centripetal part, and that of the turning link."""
+    """gamma of Phi_q a + gamma = 0: centripetal accelerations of the points, and that of the turning link."""
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     bx = wd[2] ** 2 * px - wd[5] ** 2 * cx
     by = wd[2] ** 2 * py - wd[5] ** 2 * cy
@@ -62,7 +62,7 @@ def distance_gamma(par, w, wd, gamma):
 
 @kernel
 def distance_velocity_slope(par, w, wd, out):
-    """d(Phi_q v)/dq = dPhi_q/dt."""
+    """Slopes of the rate of Phi by coordinates: d(Phi_q v)/dq, which is dPhi_q/dt."""
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     fx = inverse * (dx - rate * ex)
     fy = inverse * (dy - rate * ey)
@@ -120,7 +120,8 @@ def distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
 
 @kernel
 def distance_stiffness(par, w, lam, k):
-    """k += lam d2|d|/dq2 = lam (u^T u (I - e e^T)/|d| and the turning of the arms)."""
+    """Add the slopes of the joint's forces to k: lam d2|d|/dq2 = lam (u^T u (I - e e^T)/|d| and the turning of the
+    arms)."""
     px, py, cx, cy = arms(par, w)
     x = w[3] + cx - w[0] - px
     y = w[4] + cy - w[1] - py

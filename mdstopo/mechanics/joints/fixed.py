@@ -17,7 +17,8 @@ from mdstopo.mechanics.joints.revolute import (
 
 @kernel
 def fixed_rows(par, w, phi, jac):
-    """Phi (3) and its slopes; the angle's are constant, so all else is the revolute joint's."""
+    """The three Phi of a fixed joint and their slopes Phi_q; those of the angle are constant, the others the revolute
+    joint's."""
     revolute_rows(par, w, phi, jac)
     phi[2] = w[5] - w[2]
     for i in range(6):
@@ -28,14 +29,14 @@ def fixed_rows(par, w, phi, jac):
 
 @kernel
 def fixed_gamma(par, w, wd, gamma):
-    """The points' centripetal parts; the angle has none."""
+    """gamma of Phi_q a + gamma = 0: the centripetal accelerations of the points; the angle has none."""
     revolute_gamma(par, w, wd, gamma)
     gamma[2] = 0.0
 
 
 @kernel
 def fixed_velocity_slope(par, w, wd, out):
-    """d(Phi_q v)/dq; the angle's row is zero."""
+    """Slopes of the rate of Phi by coordinates, d(Phi_q v)/dq; those of the angle's row are zero."""
     revolute_velocity_slope(par, w, wd, out)
     for i in range(6):
         out[2, i] = 0.0
@@ -61,7 +62,7 @@ def fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
 
 @kernel
 def fixed_moment(lam, by_lam):
-    """The multiplier of the angle's row."""
+    """The moment of the joint: the multiplier of the angle's row."""
     by_lam[2] = 1.0
     return lam[2]
 

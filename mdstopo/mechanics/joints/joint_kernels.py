@@ -37,7 +37,8 @@ class AtHome(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class JointKernels:
-    """A joint of one to three rows Phi = 0; the equations of motion are M a + Phi_q^T lam = F.
+    """The kernels of a joint with one to three constraint equations Phi = 0; the equations of motion are M a +
+    Phi_q^T lam = F.
 
     steady: for each row the slopes that are the same wherever the bodies are, as columns (x 0, y 1, angle 2) of either
     body. Where a changing slope is among them motions are wrong; an empty tuple is always right and costs time.
@@ -65,5 +66,5 @@ class JointKernels:
 
     @property
     def rows(self) -> int:
-        """How many rows it has."""
+        """How many constraint equations the joint has."""
         return len(self.steady)

@@ -29,7 +29,7 @@ CODES: dict[str, int] = {}
 
 
 def kernels_of(joint: type[Joint]) -> JointKernels:
-    """The kernels of a joint."""
+    """The kernels of a joint, from the module that its record names."""
     if joint.type not in CODES:
         enter(joint)
         store.include(joint.kernels)
@@ -37,13 +37,13 @@ def kernels_of(joint: type[Joint]) -> JointKernels:
 
 
 def code_of(joint: type[Joint]) -> int:
-    """The code of a joint."""
+    """The code by which kernels know a joint."""
     kernels_of(joint)
     return CODES[joint.type]
 
 
 def enter(joint: type[Joint]) -> None:
-    """Give a joint its code."""
+    """Give a joint a code and add its kernels to the table."""
     CODES[joint.type] = LISTED.add(importlib.import_module(joint.kernels).KERNELS)
 
 
@@ -85,7 +85,7 @@ def _size(home: FloatArray, first: int, second: int, joint: Joint) -> float:
 
 
 def describe(joint: Joint) -> str:
-    """A joint in words."""
+    """A joint in words: its name, type and bodies."""
     name = f"{joint.name} " if not joint.name.isdigit() else f"joints[{joint.index}] "
     return f"joint {name}({joint.type}, between {joint.bodies[0]} and {joint.bodies[1]})"
 
@@ -102,14 +102,14 @@ def joint_rows(code, par, w, phi, jac):
 
 @chosen(LISTED, lambda each: each.gamma, part)
 def joint_gamma(code, par, w, wd, gamma):
-    """gamma (3,) of Phi_q a + gamma = 0."""
+    """gamma (3,) of Phi_q a + gamma = 0: what velocities add to the second derivative of Phi."""
     for r in range(_row_count(code)):
         gamma[r] = 0.0
 
 
 @chosen(LISTED, lambda each: each.velocity_slope, part)
 def joint_velocity_slope(code, par, w, wd, out):
-    """out (3, 6) = d(Phi_q v)/dq."""
+    """Slopes of the rate of Phi by coordinates: out (3, 6) = d(Phi_q v)/dq."""
     for r in range(_row_count(code)):
         for i in range(6):
             out[r, i] = 0.0
@@ -136,7 +136,7 @@ def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):
 
 @chosen(LISTED, lambda each: each.stiffness, part)
 def joint_stiffness(code, par, w, lam, k):
-    """k (6, 6) += d(Phi_q^T lam)/dq."""
+    """Add the slopes of a joint's forces, d(Phi_q^T lam)/dq, to k (6, 6)."""
 
 
 @chosen(LISTED, lambda each: each.is_point or None, part)

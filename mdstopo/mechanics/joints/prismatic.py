@@ -27,7 +27,7 @@ def _frame(par, w):
 
 @kernel
 def prismatic_rows(par, w, phi, jac):
-    """Phi (2) and its slopes."""
+    """The two Phi of a prismatic joint, and their slopes Phi_q."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     # n . D less n_h . D_h at home, in what n and D have changed by
     px, py, _, _ = arms(par, w)
@@ -50,7 +50,7 @@ def prismatic_rows(par, w, phi, jac):
 
 @kernel
 def prismatic_gamma(par, w, wd, gamma):
-    """gamma: what the second derivative of Phi has beside Phi_q a."""
+    """gamma of Phi_q a + gamma = 0: what velocities add to the second derivative of Phi."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     dx = wd[3] - wd[0] - wd[5] * cy
     dy = wd[4] - wd[1] + wd[5] * cx
@@ -60,7 +60,7 @@ def prismatic_gamma(par, w, wd, gamma):
 
 @kernel
 def prismatic_velocity_slope(par, w, wd, out):
-    """d(Phi_q v)/dq."""
+    """Slopes of the rate of Phi by coordinates: d(Phi_q v)/dq."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     dx = wd[3] - wd[0] - wd[5] * cy
     dy = wd[4] - wd[1] + wd[5] * cx
@@ -118,7 +118,7 @@ def prismatic_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
 
 @kernel
 def prismatic_stiffness(par, w, lam, k):
-    """k += d(Phi_q^T lam)/dq."""
+    """Add the slopes of the joint's forces, d(Phi_q^T lam)/dq, to k."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     f = lam[0]
     k[0, 2] += f * ny

@@ -15,7 +15,7 @@ PLACES = 18
 
 @part
 def place_turned(home, a, b, q, turns_a, turns_b, w):
-    """Tell a joint where its bodies are, with the turns of both given.
+    """Fill w (PLACES,) with where the bodies of a joint are, their rotations being given.
 
     In:
       home (n_body, HOME): where bodies are when q is zero.
@@ -41,13 +41,13 @@ def place_turned(home, a, b, q, turns_a, turns_b, w):
 
 @part
 def place_joint(home, a, b, q, w):
-    """Fill w (PLACES,) of bodies a and b from q (n,)."""
+    """Fill w (PLACES,) with where bodies a and b of a joint are, at coordinates q (n,)."""
     place_turned(home, a, b, q, turned_body(home, a, q[3 * a + 2]), turned_body(home, b, q[3 * b + 2]), w)
 
 
 @part
 def apart_since(par, w):
-    """What x_B + c - x_A - p has changed by since home."""
+    """By how much the vector between the two points of the joint, x_B + c - x_A - p, has changed since home."""
     return (
         w[12] - w[10] + (w[16] * par[2] - w[17] * par[3]) - (w[14] * par[0] - w[15] * par[1]),
         w[13] - w[11] + (w[17] * par[2] + w[16] * par[3]) - (w[15] * par[0] + w[14] * par[1]),
@@ -56,7 +56,7 @@ def apart_since(par, w):
 
 @part
 def arms(par, w):
-    """px, py, cx, cy: the points relative to their centres of mass, global axes."""
+    """Vectors from the centres of mass to the joint's points, in global axes: px, py, cx, cy."""
     ca = w[6]
     sa = w[7]
     cb = w[8]
@@ -71,7 +71,7 @@ def arms(par, w):
 
 @part
 def revolute_rows(par, w, phi, jac):
-    """Phi (2) and its slopes."""
+    """The two Phi of a revolute joint, and their slopes Phi_q."""
     px, py, cx, cy = arms(par, w)
     x, y = apart_since(par, w)
     phi[0] = par[8] + x
@@ -89,7 +89,7 @@ def revolute_rows(par, w, phi, jac):
 
 @part
 def revolute_gamma(par, w, wd, gamma):
-    """Centripetal parts of the second derivative."""
+    """gamma of Phi_q a + gamma = 0: the centripetal accelerations of the joint's points."""
     px, py, cx, cy = arms(par, w)
     gamma[0] = wd[2] * wd[2] * px - wd[5] * wd[5] * cx
     gamma[1] = wd[2] * wd[2] * py - wd[5] * wd[5] * cy
@@ -97,7 +97,7 @@ def revolute_gamma(par, w, wd, gamma):
 
 @part
 def revolute_velocity_slope(par, w, wd, out):
-    """d(Phi_q v)/dq: only the arms turn."""
+    """Slopes of the rate of Phi by coordinates, d(Phi_q v)/dq: only the arms turn."""
     px, py, cx, cy = arms(par, w)
     for r in range(2):
         for i in range(6):
@@ -168,14 +168,14 @@ def revolute_vjp(par, w, wd, wdd, lam, y0, y1, z_first, z_second):
 
 @part
 def revolute_stiffness(par, w, lam, k):
-    """k += d(Phi_q^T lam)/dq."""
+    """Add the slopes of the joint's forces, d(Phi_q^T lam)/dq, to k."""
     px, py, cx, cy = arms(par, w)
     k[2, 2] += lam[0] * px + lam[1] * py
     k[5, 5] -= lam[0] * cx + lam[1] * cy
 
 
 def point_at_home(_: object, home: AtHome) -> dict[int, float]:
-    """Phi at home, by the places of its entries in the parameters."""
+    """Phi of the two points at home, by the place of its entries in the parameters."""
     return {8: home.x, 9: home.y}
 
 

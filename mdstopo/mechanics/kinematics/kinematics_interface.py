@@ -38,7 +38,7 @@ _ENDING = "Structure"
 
 @dataclass(frozen=True, kw_only=True)
 class Kinematics:
-    """How the bodies of one kind of model move.
+    """The functions by which the bodies of one kind of model, in a plane or in space, move.
 
     coordinates, freedoms, rotations, attitude: N, D, T, A of a body. rows: the most rows of a joint. at_home (N): the
     coordinates of a body that has not moved. kernels: a function for each of this module, without those that only
@@ -56,7 +56,8 @@ class Kinematics:
 
     @property
     def turns_couple(self) -> bool:
-        """Whether turning rates of a body act on each other: gyroscopic moments, which depend on velocity."""
+        """Whether rotations of a body about its axes act on each other: gyroscopic moments, which depend on
+        velocity."""
         return self.load_slopes > self.rotations
 
     def of_python(self, name: str) -> Callable[..., Any]:
@@ -66,12 +67,12 @@ class Kinematics:
 
     @property
     def pose_size(self) -> int:
-        """`pose_size` in Python."""
+        """How many numbers a relative pose has; `pose_size`, called from Python."""
         return int(self.kernels["pose_size"].py_func(None))
 
     @property
     def load_slopes(self) -> int:
-        """`load_slopes` in Python."""
+        """Whether loads change with the coordinates of bodies; `load_slopes`, called from Python."""
         return int(self.kernels["load_slopes"].py_func(None))
 
     def retract(self, q: FloatArray, shift: FloatArray) -> FloatArray:
@@ -91,7 +92,7 @@ class Kinematics:
         return shift
 
     def differences(self, after: FloatArray, before: FloatArray) -> FloatArray:
-        """Of many states: the shifts (T, n) that lead from coordinates (n_q,) to others (T, n_q)."""
+        """The changes (T, n) that lead from coordinates (n_q,) to those of many states (T, n_q)."""
         return after - before
 
 
@@ -99,17 +100,17 @@ class Kinematics:
 
 
 def coordinates(model):
-    """N: coordinates of a body."""
+    """How many coordinates a body has (N in the other docstrings)."""
     raise NotImplementedError
 
 
 def freedoms(model):
-    """D: velocities of a body, and components of a relative velocity."""
+    """How many freedoms a body has: components of its velocity (D in the other docstrings)."""
     raise NotImplementedError
 
 
 def rotations(model):
-    """T: how many of them, the last ones, are about turning."""
+    """How many of a body's freedoms, the last ones, are rotations (T in the other docstrings)."""
     raise NotImplementedError
 
 
@@ -119,22 +120,22 @@ def load_slopes(model):
 
 
 def attitude(model):
-    """A: numbers of a body in `turn_bodies`."""
+    """How many numbers describe the attitude of a body in `turn_bodies` (A)."""
     raise NotImplementedError
 
 
 def most_rows(model):
-    """The most rows that a joint has."""
+    """The largest number of constraint equations that a joint has."""
     raise NotImplementedError
 
 
 def pose_size(model):
-    """POSE: numbers of a relative pose and its rates."""
+    """How many numbers a relative pose has with its rates (POSE in the other docstrings)."""
     raise NotImplementedError
 
 
 def joint_places(model):
-    """PLACES: numbers that tell a joint where its bodies are."""
+    """How many numbers tell a joint where its bodies are (PLACES in the other docstrings)."""
     raise NotImplementedError
 
 
@@ -185,12 +186,13 @@ def retract_jvp(model, q, moved, dq, dshift, out):
 
 
 def shift_size(model):
-    """SHIFT: numbers of a body in `shift_tangents`."""
+    """How many numbers a body has in `shift_tangents` (SHIFT)."""
     raise NotImplementedError
 
 
 def shift_tangents(model, q, moved, out):
-    """How turns of `retract` change with its shift, for `slope_by_shift` and what else takes `tangents`.
+    """The derivatives of the rotations in `retract` by its shift, for `slope_by_shift` and others that take
+    `tangents`.
 
     In:
       model: the compiled scene.
@@ -202,7 +204,7 @@ def shift_tangents(model, q, moved, out):
 
 
 def slope_by_shift(model, slopes, m, r, i, tangents, body):
-    """The slope by a component of a shift, from those by what coordinates behind it change by.
+    """The slope by one component of a shift, from the slopes by the coordinates behind the shift.
 
     model: the compiled scene.
     slopes (., ., 2 D), m, r: an array, and where in it the slopes by two bodies stand.
@@ -250,7 +252,7 @@ def add_shift_curvature(model, shift, mass, body, first, k):
 
 
 def turn_back(model, shift, transposed, x):
-    """Changes of coordinates behind a shift become the change of the shift that they make, where it begins stays.
+    """From changes of coordinates behind a shift, the change of the shift that causes them, with the same beginning.
 
     In:
       model: the compiled scene.
@@ -263,7 +265,7 @@ def turn_back(model, shift, transposed, x):
 
 
 def shift_further(model, start, shift, change, q):
-    """Change a shift, and coordinates with it.
+    """Change a shift, and with it the coordinates to which it leads.
 
     In:
       model: the compiled scene.
@@ -466,12 +468,12 @@ def window_accelerations(model, x, y, u, a):
 
 
 def window_rates(model, x, y, a, u):
-    """u (n - D or more,): what accelerations a (n,) at x, y make of it."""
+    """u (n - D or more,) that accelerations a (n,) at x, y correspond to."""
     raise NotImplementedError
 
 
 def window_size(model):
-    """MAPS: numbers of a body in `window_maps`."""
+    """How many numbers a body has in `window_maps` (MAPS)."""
     raise NotImplementedError
 
 
@@ -528,7 +530,7 @@ def window_vjp(model, maps, bar_q, bar_v, bar_a, bar_x, bar_y):
 
 
 def window_turn(model, maps, inverse, transposed, x):
-    """Multiply by what a change of coordinates is of one of x, and accelerations of u.
+    """Multiply by the derivative of coordinates by x, or of accelerations by u, or by its inverse or transpose.
 
     In:
       model: the compiled scene.
@@ -610,12 +612,13 @@ def turned_pose(model, p, turned, q, v, rel):
 
 
 def pose_acceleration(model, rel, p, a, out):
-    """out (D,): xi'' of pair p from its pose in rel (n_pair, POSE) and accelerations a (n,)."""
+    """The second derivative xi'' of the relative pose of pair p: out (D,), from rel (n_pair, POSE) and accelerations a
+    (n,)."""
     raise NotImplementedError
 
 
 def pair_displacement(model, rel, p, dq, out):
-    """out (D,): the change of the relative pose of pair p under a change dq (n,) of all bodies."""
+    """The change of the relative pose of pair p under a change dq (n,) of all bodies: out (D,)."""
     raise NotImplementedError
 
 
@@ -710,7 +713,7 @@ def motion_weights(model, rel, scale, weight):
 
 
 def noise_of(model, noise, rel, q, p):
-    """What rounding leaves uncertain of how far a pair has moved (m).
+    """By how much the displacement of a pair is uncertain because of rounding (m).
 
     noise (n_pair,): of `rounding_of_pairs`; rel (n_pair, POSE): relative poses; q (n_q,): coordinates; p: the pair.
     """
@@ -733,7 +736,7 @@ def add_gross_force(model, rel, p, force, out):
 
 
 def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
-    """Estimate what rounding leaves uncertain of how far each pair has moved.
+    """Estimate by how much the displacement of each pair is uncertain because of rounding.
 
     In:
       model: the compiled scene.
@@ -751,7 +754,7 @@ def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
 
 
 def stretch_of(model, i, r):
-    """Elongation (m) and its rate (m/s)."""
+    """Elongation (m) of member i and its rate (m/s), at a relative pose r."""
     raise NotImplementedError
 
 
@@ -801,7 +804,7 @@ def member_rows(model, p, i, q, v, row, row_rate):
 
 
 def end_slopes(model, p, i, side, along, q, v, a, row_slope):
-    """What moving an end of a member in its body does to the length and to the row B, at a fixed motion.
+    """Derivatives of the length and of the row B by moving an end of a member in its body, at fixed motion.
 
     In:
       model: the compiled scene.
@@ -934,7 +937,7 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
 
 
 def has_spring_energies(model):
-    """Whether there is `spring_energies`."""
+    """Whether `spring_energies` is implemented."""
     raise NotImplementedError
 
 
@@ -984,12 +987,12 @@ def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r,
 
 
 def place_joint(model, j, q, turned, w):
-    """w (PLACES,): where the bodies of joint j are, at coordinates q (n_q,) and attitudes turned (n_body, A)."""
+    """Where the bodies of joint j are: w (PLACES,), at coordinates q (n_q,) and attitudes turned (n_body, A)."""
     raise NotImplementedError
 
 
 def place_joint_alone(model, j, q, w):
-    """`place_joint` where no attitudes are known."""
+    """Where both bodies of a joint are, as of `place_joint`, where attitudes of bodies are not at hand."""
     raise NotImplementedError
 
 
@@ -1027,7 +1030,7 @@ def joint_stiffness(model, j, w, lam, k):
 
 
 def joint_is_point(model, j):
-    """Whether `point_joint_vjp` serves joint j."""
+    """Whether joint j only holds two points together, so that `point_joint_vjp` can be used."""
     raise NotImplementedError
 
 
@@ -1060,7 +1063,7 @@ def contact_directions(model):
 
 
 def contact_seen(model, j, r):
-    """Where the point of a contact is as seen from the edge or surface.
+    """Where the point of a contact lies against the edge or surface.
 
     model: the compiled scene. j: the contact. r (POSE,): relative pose of its pair.
 
@@ -1076,7 +1079,8 @@ def contact_second_rise(model, j, r, acc):
 
 
 def contact_distance(model, j, r):
-    """How far the point of contact j is from what its surface bends around (m), infinite where that is flat."""
+    """The distance of the point of contact j from the centre or axis of its curved surface (m); infinite where it is
+    flat."""
     raise NotImplementedError
 
 
@@ -1095,7 +1099,7 @@ def contact_ends(model, j, q, v, rows, rate):
 
 
 def contact_drag(model, j, q, v, rows):
-    """How the point of a contact slides, in the directions in which it is pushed.
+    """The velocity at which the point of a contact slides, in the directions in which it is pushed.
 
     In:
       model: the compiled scene.
@@ -1220,7 +1224,7 @@ INTERFACE: dict[str, Callable[..., Any]] = {
 
 
 def move_by(maker: type, kinematics: Kinematics) -> None:
-    """Have the bodies of a model, which `maker` makes in kernels (`general.structures`), move so."""
+    """Register the kinematics of the models that `maker` makes in kernels (`general.structures`)."""
     _MOVED_BY[maker.__name__] = kinematics
 
 

@@ -93,62 +93,62 @@ K_XX, K_YY = 7, 11
 
 @part
 def coordinates(model):
-    """x, y, psi."""
+    """Three coordinates a body: x, y, psi."""
     return COORDINATES
 
 
 @part
 def freedoms(model):
-    """The rates of x, y, psi."""
+    """Three freedoms a body: the rates of x, y, psi."""
     return FREEDOMS
 
 
 @part
 def rotations(model):
-    """One angle."""
+    """One of the freedoms of a body is a rotation."""
     return ROTATIONS
 
 
 @part
 def load_slopes(model):
-    """Loads change with the angle of their body."""
+    """Whether loads change with coordinates: in a plane those fixed to a body turn with its angle."""
     return ROTATIONS
 
 
 @part
 def attitude(model):
-    """cos - 1 and sin of an angle."""
+    """Two numbers a body: cos - 1 and sin of its angle."""
     return ATTITUDE
 
 
 @part
 def most_rows(model):
-    """A fixed joint has three rows."""
+    """The largest number of equations of a joint: a fixed joint has three."""
     return ROWS
 
 
 @part
 def pose_size(model):
-    """See `planar_poses`."""
+    """How many numbers a relative pose has; see `planar_poses`."""
     return POSE
 
 
 @part
 def joint_places(model):
-    """See `joints.revolute`."""
+    """Size of what `place_joint` tells of two bodies; see `joints.revolute`."""
     return PLACES
 
 
 @part
 def retract(model, q, shift, out):
-    """Coordinates in a plane are added to as they are."""
+    """Move bodies by a shift: in a plane it is added to their coordinates."""
     for d in range(shift.shape[0]):
         out[d] = q[d] + shift[d]
 
 
 @part
 def difference(model, after, before, out):
-    """They are subtracted as they are."""
+    """The change between two coordinates: in a plane they are subtracted as they are."""
     for d in range(out.shape[0]):
         out[d] = after[d] - before[d]
 
@@ -170,7 +170,7 @@ def retract_jvp(model, q, moved, dq, dshift, out):
 
 @part
 def moved_most(model, q, size):
-    """The largest of all |x|, |y| and |psi| size."""
+    """How far bodies have moved since home (m): the largest of all |x|, |y| and |psi| times size."""
     moved = 0.0
     for body in range(model.home.shape[0]):
         b = COORDINATES * body
@@ -180,20 +180,20 @@ def moved_most(model, q, size):
 
 @part
 def turn_bodies(model, q, turned):
-    """cos - 1 and sin of the angle that every body has turned by."""
+    """The attitudes of all bodies: cos - 1 and sin of the angle that each has turned by since home."""
     for b in range(turned.shape[0]):
         turned[b, 0], turned[b, 1] = small_turn(q[COORDINATES * b + 2])
 
 
 @part
 def relative_pose(model, q, v, rel):
-    """See `planar_poses`."""
+    """The relative poses of all pairs at one state; see `planar_poses.relative_pose`."""
     poses_of_pairs(model.pair, model.home, q, v, rel)
 
 
 @part
 def turned_pose(model, p, turned, q, v, rel):
-    """See `planar_poses.fill_pose`; see `kinematics_interface.turned_pose`."""
+    """The relative pose of one pair of bodies whose attitudes are known; see `kinematics_interface.turned_pose`."""
     one = model.pair[p, 0]
     two = model.pair[p, 1]
     fill_pose(model.pair, p, model.home, q, v, turned[one, 0], turned[one, 1], turned[two, 0], turned[two, 1], rel)
@@ -201,7 +201,8 @@ def turned_pose(model, p, turned, q, v, rel):
 
 @kernel
 def pose_acceleration(model, rel, p, a, out):
-    """d'' = R^T D'' + omega' (dy, -dx) + 2 omega (vy, -vx) + omega^2 d, theta'' = psi_B'' - psi_A''."""
+    """Second derivative of the relative pose: d'' = R^T D'' + omega' (dy, -dx) + 2 omega (vy, -vx) + omega^2 d, theta''
+    = psi_B'' - psi_A''."""
     i = FREEDOMS * model.pair[p, 0]
     j = FREEDOMS * model.pair[p, 1]
     r = rel[p]
@@ -218,19 +219,19 @@ def pose_acceleration(model, rel, p, a, out):
 
 @part
 def pair_displacement(model, rel, p, dq, out):
-    """See `planar_poses`."""
+    """The change of a relative pose under a change of coordinates; see `planar_poses.pair_displacement`."""
     displacement_of_pair(model.pair, rel, p, dq, out)
 
 
 @part
 def add_pair_force(model, rel, p, force, first, out):
-    """See `planar_poses`; see `kinematics_interface.add_pair_force`."""
+    """Add a force on a relative pose to the forces on its bodies; see `kinematics_interface.add_pair_force`."""
     add_force_of_pair(model.pair, rel, p, force[first], force[first + 1], force[first + 2], out)
 
 
 @part
 def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
-    """See `planar_forces`; see `kinematics_interface.pair_tangent`."""
+    """The tangents of a pair in the freedoms of its bodies; see `kinematics_interface.pair_tangent`."""
     tangent_of_pair(p, rel, sums, damped, k_out, c_out)
 
 
@@ -252,19 +253,19 @@ def pair_matrix_vjp(model, p, m, z, bar):
 
 @part
 def pair_stiffness(model, sums, p):
-    """The trace of the stiffness against displacements."""
+    """A measure of the stiffness of a pair against displacements (N/m): the trace of the matrix."""
     return sums[p, K_XX] + sums[p, K_YY]
 
 
 @part
 def turning_rate(model, rel, p):
-    """The size of the rate of theta."""
+    """The magnitude of the rate of pair p's relative angle (rad/s)."""
     return abs(rel[p, VT])
 
 
 @part
 def add_loads(model, segment, t, q, v, f):
-    """See `planar_forces`: inertia in a plane has no forces of its own; see `kinematics_interface.add_loads`."""
+    """Add the applied loads; inertia adds none in a plane; see `kinematics_interface.add_loads`."""
     add_applied_loads(model, segment, t, q, f)
     if model.timed_load.shape[0] > 0:
         add_timed_loads(model, segment, t, q, f)
@@ -272,7 +273,7 @@ def add_loads(model, segment, t, q, v, f):
 
 @part
 def load_tangent(model, segment, t, q, v, turn):
-    """See `planar_forces`: each body has one angle; see `kinematics_interface.load_tangent`."""
+    """Slopes of the applied loads by the angle of their body; see `kinematics_interface.load_tangent`."""
     tangent_of_loads(model, segment, t, q, turn.reshape(turn.size))
     if model.timed_load.shape[0] > 0:
         add_timed_tangent(model, segment, t, q, turn.reshape(turn.size))
@@ -280,7 +281,7 @@ def load_tangent(model, segment, t, q, v, turn):
 
 @part
 def gross_loads(model, out):
-    """See `planar_scales`."""
+    """The largest sizes of the applied loads; see `planar_scales.gross_loads`."""
     gross_steady_loads(model, out)
     if model.timed_load.shape[0] > 0:
         add_gross_timed_loads(model, out)
@@ -288,7 +289,7 @@ def gross_loads(model, out):
 
 @part
 def home_extent(model):
-    """The largest of all |x| and |y|."""
+    """The extent of the scene at home (m): the largest of all |x| and |y|."""
     extent = 0.0
     for b in range(model.home.shape[0]):
         extent = max(extent, abs(model.home[b, HOME_X]), abs(model.home[b, HOME_Y]))
@@ -297,43 +298,43 @@ def home_extent(model):
 
 @part
 def deflection(model, rel, rel0, p):
-    """See `planar_scales`."""
+    """How far the points of a pair have moved between two poses (m); see `planar_scales.deflection`."""
     return deflection_of_pair(rel, rel0, model.reach, p)
 
 
 @part
 def largest_turn(model, before, after):
-    """See `planar_scales`."""
+    """The largest relative rotation of a pair between two states (rad); see `planar_scales.largest_turn`."""
     return turn_of_pairs(model.pair, before, after)
 
 
 @part
 def motion_weights(model, rel, scale, weight):
-    """See `planar_scales`."""
+    """Weights by which changes of coordinates become relative displacements; see `planar_scales.motion_weights`."""
     weights_of_motion(model.pair, rel, model.reach, scale, weight)
 
 
 @part
 def noise_of(model, noise, rel, q, p):
-    """See `planar_scales`."""
+    """By how much a pair's displacement is uncertain because of rounding (m); see `planar_scales.noise_of`."""
     return noise_of_pair(model.pair, noise, rel, model.reach, q, p)
 
 
 @part
 def arm_of(model, rel, p):
-    """The distance of both bodies, and the reach of the points of the second."""
+    """The distance of both bodies of a pair, plus the reach of the points of the second (m)."""
     return np.sqrt(rel[p, DX] * rel[p, DX] + rel[p, DY] * rel[p, DY]) + model.reach[p]
 
 
 @part
 def add_gross_force(model, rel, p, force, out):
-    """See `planar_scales`."""
+    """Add the sizes of a force between two bodies, and of its moments; see `planar_scales.add_gross_force`."""
     add_gross(model.pair, rel, model.reach, p, force, out)
 
 
 @part
 def place_joint(model, j, q, turned, w):
-    """See `joints.revolute.place_turned`; see `kinematics_interface.place_joint`."""
+    """Where both bodies of a joint are; see `kinematics_interface.place_joint`."""
     one = model.joint[j, 1]
     two = model.joint[j, 2]
     turns_one = turned_from(model.home, one, turned[one, 0], turned[one, 1])
@@ -342,43 +343,43 @@ def place_joint(model, j, q, turned, w):
 
 @part
 def place_joint_alone(model, j, q, w):
-    """See `joints.revolute.place_joint`."""
+    """Where both bodies of a joint are; see `joints.revolute.place_joint`."""
     place_joint_of_bodies(model.home, model.joint[j, 1], model.joint[j, 2], q, w)
 
 
 @part
 def joint_rows(model, j, w, phi, jac):
-    """See `joints.table`; see `kinematics_interface.joint_rows`."""
+    """Phi of a joint and its slopes Phi_q; see `kinematics_interface.joint_rows`."""
     rows_by_code(model.joint[j, 0], model.joint_par[j], w, phi, jac)
 
 
 @part
 def joint_gamma(model, j, w, wd, gamma):
-    """See `joints.table`; see `kinematics_interface.joint_gamma`."""
+    """gamma of Phi_q a + gamma = 0 of a joint; see `kinematics_interface.joint_gamma`."""
     gamma_by_code(model.joint[j, 0], model.joint_par[j], w, wd, gamma)
 
 
 @part
 def joint_velocity_slope(model, j, w, wd, out):
-    """See `joints.table`; see `kinematics_interface.joint_velocity_slope`."""
+    """Slopes of the rate of a joint's Phi by coordinates; see `kinematics_interface.joint_velocity_slope`."""
     velocity_slope_by_code(model.joint[j, 0], model.joint_par[j], w, wd, out)
 
 
 @part
 def joint_acceleration_slopes(model, j, w, wd, wdd, by_q, by_v):
-    """See `joints.table`; see `kinematics_interface.joint_acceleration_slopes`."""
+    """Slopes of Phi_q a + gamma; see `kinematics_interface.joint_acceleration_slopes`."""
     acceleration_slopes_by_code(model.joint[j, 0], model.joint_par[j], w, wd, wdd, by_q, by_v)
 
 
 @part
 def joint_stiffness(model, j, w, lam, k):
-    """See `joints.table`; see `kinematics_interface.joint_stiffness`."""
+    """Add the slopes of a joint's forces; see `kinematics_interface.joint_stiffness`."""
     stiffness_by_code(model.joint[j, 0], model.joint_par[j], w, lam, k)
 
 
 @part
 def joint_is_point(model, j):
-    """See `joints.table`; see `kinematics_interface.joint_is_point`."""
+    """Whether a joint only holds two points together; see `kinematics_interface.joint_is_point`."""
     return is_point_by_code(model.joint[j, 0])
 
 
@@ -399,7 +400,7 @@ def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
 
 @part
 def transmitted(model, j, which, q, lam, by_lam, by_q):
-    """See `joints.table.joint_transmitted`; see `kinematics_interface.transmitted`."""
+    """Norm of the force or moment that a joint transmits; see `kinematics_interface.transmitted`."""
     w = np.empty(PLACES)
     place_joint_of_bodies(model.home, model.joint[j, 1], model.joint[j, 2], q, w)
     return joint_transmitted(model.joint[j, 0], model.joint_par[j], w, lam, which, by_lam, by_q)

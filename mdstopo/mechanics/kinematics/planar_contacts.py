@@ -17,7 +17,7 @@ DIRECTIONS = 2
 
 @part
 def contact_directions(model):
-    """Along the edge, and normal to it."""
+    """Two directions of a contact's force: along the edge, and normal to it."""
     return DIRECTIONS
 
 
@@ -33,13 +33,13 @@ def contact_seen(model, j, r):
 
 @part
 def contact_second_rise(model, j, r, acc):
-    """See `mechanics.contact.second_rise`."""
+    """Second derivative of the height of a contact's point by time (m/s^2); see `mechanics.contact.second_rise`."""
     return second_rise(model.contact[j], r, acc)
 
 
 @part
 def contact_distance(model, j, r):
-    """An edge is straight."""
+    """The distance from the centre of curvature of what is touched (m): infinite, an edge is straight."""
     return np.inf
 
 

@@ -281,13 +281,13 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
 
 @part
 def has_spring_energies(model):
-    """No: in a plane energies are part of `member_designs`."""
+    """Whether `spring_energies` is implemented: no, in a plane energies are part of `member_designs`."""
     return False
 
 
 @part
 def spring_energies(model, p, lo, count, rel, pair, weight, out):
-    """Never called; see `kinematics_interface.spring_energies`."""
+    """Not implemented and never called in a plane; see `kinematics_interface.spring_energies`."""
 
 
 @part

@@ -99,13 +99,13 @@ def end_jvp(model, table, s, h, q, v, changes, dq, dv):
 
 @part
 def shift_size(model):
-    """A shift is added to coordinates: its tangent is 1 and needs no numbers."""
+    """How many numbers a body has in `shift_tangents`: none in a plane, where shifts are added to coordinates."""
     return 0
 
 
 @part
 def shift_tangents(model, q, moved, out):
-    """Nothing to say; see `kinematics_interface.shift_tangents`."""
+    """Do nothing: in a plane the derivative by a shift is 1; see `kinematics_interface.shift_tangents`."""
 
 
 @part
@@ -122,24 +122,24 @@ def turn_slope_by_shift(model, slopes, d, r, tangents, body):
 
 @part
 def add_shift(model, tangents, w, shift, dq):
-    """See `kinematics_interface.add_shift`."""
+    """Add the change of a shift to that of coordinates; see `kinematics_interface.add_shift`."""
     for d in range(dq.shape[0]):
         dq[d] += w * shift[d]
 
 
 @part
 def add_shift_curvature(model, shift, mass, body, first, k):
-    """There is none; see `kinematics_interface.add_shift_curvature`."""
+    """Add nothing: in a plane there is no curvature; see `kinematics_interface.add_shift_curvature`."""
 
 
 @part
 def turn_back(model, shift, transposed, x):
-    """As they are; see `kinematics_interface.turn_back`."""
+    """Do nothing: changes of coordinates are those of the shift; see `kinematics_interface.turn_back`."""
 
 
 @part
 def shift_further(model, start, shift, change, q):
-    """See `kinematics_interface.shift_further`."""
+    """Change a shift and the coordinates to which it leads; see `kinematics_interface.shift_further`."""
     for d in range(q.shape[0]):
         q[d] += change[d]
 

@@ -26,7 +26,7 @@ def quaternion_at(q, i):
 
 @part
 def product(e, f):
-    """The quaternion of the turn e behind which f turns in the turned frame."""
+    """The quaternion of two rotations: e, and then f about axes turned by e."""
     return (
         e[0] * f[0] - e[1] * f[1] - e[2] * f[2] - e[3] * f[3],
         e[0] * f[1] + e[1] * f[0] + e[2] * f[3] - e[3] * f[2],
@@ -52,7 +52,7 @@ def exponential(t):
 
 @part
 def turn_by(e, t):
-    """The quaternion of the turn e behind which the body turns by t, with its length put to 1."""
+    """The quaternion of the rotation e and then one by the rotation vector t about the body's own axes, normalised."""
     x = product(e, exponential(t))
     s = 1.0 / math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3])
     return s * x[0], s * x[1], s * x[2], s * x[3]
@@ -60,7 +60,7 @@ def turn_by(e, t):
 
 @part
 def logarithm(e):
-    """The rotation vector of a turn, of half a turn at most."""
+    """The rotation vector of a quaternion, of half a turn at most."""
     sign = -1.0 if e[0] < 0.0 else 1.0
     square = e[1] * e[1] + e[2] * e[2] + e[3] * e[3]
     if square < 1e-4:
@@ -102,7 +102,7 @@ def _weights(square):
 
 @part
 def turn_rate(t, u):
-    """J(t) u: the turning rate in the turned frame while t changes at the rate u."""
+    """The angular velocity J(t) u in the turned frame, while the rotation vector t changes at the rate u."""
     first, second, _, _ = _weights(dot(t, t))
     x = cross(t, u)
     return plus(u, minus(times(second, cross(t, x)), times(first, x)))
@@ -121,7 +121,7 @@ def turn_rate_jvp(t, u, dt):
 
 @part
 def turn_rate_vjp(t, u, bar):
-    """The cotangent of t from that of J(t) u; see `vector_rate_vjp`."""
+    """The cotangent of the rotation vector t from that of J(t) u; see `vector_rate_vjp`."""
     first, second, by_first, by_second = _weights(dot(t, t))
     x = cross(t, u)
     own = minus(times(second, plus(cross(x, bar), cross(u, cross(bar, t)))), times(first, cross(u, bar)))
@@ -149,7 +149,8 @@ def _beta(square):
 
 @part
 def vector_rate(t, omega):
-    """J(t)^-1 omega: how fast t changes while the body turns at the rate omega, in its own frame."""
+    """The rate J(t)^-1 omega of the rotation vector t of a body that turns with the angular velocity omega in its own
+    frame."""
     beta, _ = _beta(dot(t, t))
     x = cross(t, omega)
     return plus(omega, plus(times(0.5, x), times(beta, cross(t, x))))
@@ -168,7 +169,7 @@ def vector_rate_jvp(t, omega, dt):
 
 @part
 def vector_rate_vjp(t, omega, bar):
-    """The cotangent of t from that of J(t)^-1 omega.
+    """The cotangent of the rotation vector t from that of J(t)^-1 omega.
 
     bar . (dt x omega) = dt . (omega x bar); bar . (dt x x) = dt . (x x bar);
     bar . (t x (dt x omega)) = (bar x t) . (dt x omega) = dt . (omega x (bar x t)).

@@ -30,7 +30,7 @@ DIRECTION, ARM = 0, 3
 
 @part
 def timed_numbers(p, mode, t):
-    """Value, rate and second derivative of a formula at a time.
+    """Value and rate of a formula of time, from its row of parameters.
 
     p (WIDTH,): its row. mode: bits of its switches. t: time (s).
     """

@@ -16,7 +16,7 @@ def vector_at(x, i):
 
 @part
 def put(x, i, a):
-    """x[i : i + 3] = a."""
+    """Write a vector into three entries of x: x[i : i + 3] = a."""
     x[i] = a[0]
     x[i + 1] = a[1]
     x[i + 2] = a[2]
@@ -24,7 +24,7 @@ def put(x, i, a):
 
 @part
 def add(x, i, a):
-    """x[i : i + 3] += a."""
+    """Add a vector to three entries of x: x[i : i + 3] += a."""
     x[i] += a[0]
     x[i + 1] += a[1]
     x[i + 2] += a[2]
@@ -32,37 +32,37 @@ def add(x, i, a):
 
 @part
 def plus(a, b):
-    """a + b."""
+    """The sum a + b of vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @part
 def minus(a, b):
-    """a - b."""
+    """The difference a - b of vectors."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @part
 def times(s, a):
-    """s a."""
+    """The vector s a, a multiplied by a number."""
     return s * a[0], s * a[1], s * a[2]
 
 
 @part
 def dot(a, b):
-    """a . b."""
+    """The scalar product a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @part
 def cross(a, b):
-    """a x b."""
+    """The vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @part
 def norm(a):
-    """|a|."""
+    """The length |a| of a vector."""
     return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 

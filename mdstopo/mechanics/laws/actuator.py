@@ -13,7 +13,7 @@ LINEAR, UPPER, LOWER = range(3)
 
 @inline
 def actuator_force(p, x, xd, mode):
-    """f, f_x, f_xd, V, V_x."""
+    """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x."""
     if mode == UPPER:
         return p[3], 0.0, 0.0, 0.0, 0.0
     if mode == LOWER:
@@ -23,7 +23,7 @@ def actuator_force(p, x, xd, mode):
 
 @inline
 def actuator_margin(p, x, xd, mode):
-    """How far the mode is from its end, in parts of the limit; infinite where there is none."""
+    """How far the force is from the end of its mode, in parts of the limit; infinite where there is no limit."""
     if p[3] <= 0.0:
         return np.inf
     f = (p[0] * (x - p[2]) + p[1] * xd) / p[3]
@@ -36,7 +36,7 @@ def actuator_margin(p, x, xd, mode):
 
 @inline
 def actuator_margin_slopes(p, x, xd, mode):
-    """Slopes of the margin by x and xd."""
+    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
     if p[3] <= 0.0:
         return 0.0, 0.0
     f = p[0] * (x - p[2]) + p[1] * xd
@@ -48,7 +48,7 @@ def actuator_margin_slopes(p, x, xd, mode):
 
 @inline
 def actuator_slopes(p, place, x, xd, mode):
-    """df/dp, dV/dp."""
+    """Slopes of force and energy by a parameter: df/dp, dV/dp."""
     if mode != LINEAR:
         return ((1.0 if mode == UPPER else -1.0) if place == 3 else 0.0), 0.0
     if place == 0:
@@ -60,7 +60,7 @@ def actuator_slopes(p, place, x, xd, mode):
 
 @inline
 def actuator_margin_slope(p, place, x, xd, mode):
-    """Slope of the margin by a parameter."""
+    """The slope of the margin, which says how far the mode is from its end, by a parameter."""
     if p[3] <= 0.0:
         return 0.0
     f = p[0] * (x - p[2]) + p[1] * xd
@@ -89,7 +89,7 @@ def actuator_start(p, x, xd):
 
 @inline
 def actuator_next(p, x, xd, mode):
-    """The mode to go to where this one's margin is negative."""
+    """The mode that follows when the margin of this one is used up."""
     if mode != LINEAR:
         return LINEAR
     return UPPER if p[0] * (x - p[2]) + p[1] * xd > 0.0 else LOWER
@@ -97,7 +97,7 @@ def actuator_next(p, x, xd, mode):
 
 @inline
 def actuator_switches(p):
-    """Whether there is a limit."""
+    """Whether the law has modes: only where its force has a limit."""
     return p[3] > 0.0
 
 

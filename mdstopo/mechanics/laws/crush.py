@@ -16,7 +16,7 @@ NEAR = 1e-12
 
 @inline
 def crush_force(p, x, mode):
-    """f, f_x, f_xd, V, V_x; V is what it gives back on the way back, f^2 / (2 k)."""
+    """Force, its slopes by x and xd, and energy with its slope by x; the energy is what it gives back, f^2 / (2 k)."""
     if mode == OPEN:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     if mode == CRUSHING:
@@ -28,7 +28,7 @@ def crush_force(p, x, mode):
 
 @inline
 def crush_idle(mode):
-    """Open, nothing acts."""
+    """Whether a member in this mode has no force: in the open one."""
     return mode == OPEN
 
 
@@ -45,7 +45,7 @@ def crush_margin(p, x, xd, mode):
 
 @inline
 def crush_margin_slopes(p, x, xd, mode):
-    """Slopes of the margin by x and xd."""
+    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
     if mode == CRUSHING:
         return 0.0, p[3]
     if mode == OPEN or p[3] * x - p[2] > 0.5 * p[1] / p[0]:
@@ -55,7 +55,7 @@ def crush_margin_slopes(p, x, xd, mode):
 
 @inline
 def crush_slopes(p, place, x, mode):
-    """df/dp, dV/dp at a fixed set."""
+    """Slopes of force and energy by the parameters, at a fixed permanent set: df/dp, dV/dp."""
     if mode == OPEN:
         return 0.0, 0.0
     if mode == CRUSHING:
@@ -92,7 +92,8 @@ def crush_set_slope(p, place):
 
 @inline
 def crush_next(p, x, mode):
-    """The mode to go to where this one's margin is negative; the force is continuous, so rates need not decide."""
+    """The mode that follows when the margin of this one is used up; the force is continuous, so rates need not
+    decide."""
     if mode != ELASTIC:
         return ELASTIC
     return CRUSHING if p[3] * x - p[2] > 0.5 * p[1] / p[0] else OPEN
@@ -125,7 +126,7 @@ def crush_first_set(p, x, mode):
 
 @inline
 def crush_grazes(p, x, mode):
-    """What a margin that is only just used up (or not) does to derivatives: nothing 0, the motion 2.
+    """How derivatives would change if a mode were only just left: not at all (0), or through the motion (2).
 
     A plateau that is only just reached leaves a permanent set on one side and none on the other.
     """
@@ -140,7 +141,7 @@ def crush_makes_set(old, new):
 
 @inline
 def crush_divides(p, x, xd, mode, near):
-    """Whether a member begins at its plateau and moves back: had it begun beyond, it would have been crushed."""
+    """Whether a member begins at its plateau and moves back, so that its set would be another if it began beyond."""
     return mode == ELASTIC and p[3] * xd <= 0.0 and abs(p[3] * x - p[2] - p[1] / p[0]) <= near
 
 

@@ -6,7 +6,7 @@ from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 @inline
 def cubic_force(p, x):
-    """f, f_x, f_xd, V, V_x."""
+    """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x."""
     square = x * x
     f = x * (p[0] + p[1] * square)
     return f, p[0] + 3.0 * p[1] * square, 0.0, square * (0.5 * p[0] + 0.25 * p[1] * square), f
@@ -14,7 +14,7 @@ def cubic_force(p, x):
 
 @inline
 def cubic_slopes(p, place, x):
-    """df/dp, dV/dp."""
+    """Slopes of force and energy by a parameter: df/dp, dV/dp."""
     if place == 0:
         return x, 0.5 * x * x
     return x * x * x, 0.25 * x * x * x * x

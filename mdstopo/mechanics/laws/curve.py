@@ -23,7 +23,7 @@ OVERLAP = 1e-8
 
 @inline
 def curve_force(p, x, mode, curves):
-    """f, f_x, f_xd, V, V_x."""
+    """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x."""
     at = int(p[0])
     n = int(p[1])
     pieces = at + n
@@ -79,7 +79,7 @@ def curve_start(p, x, xd, xdd, curves):
 
 @inline
 def curve_margin(p, x, mode, curves):
-    """How far x is from the end of the piece, m."""
+    """How far the elongation x is from the end of its piece of the curve (m)."""
     at = int(p[0])
     n = int(p[1])
     below = x - curves[at + mode - 2] if mode > 1 else np.inf
@@ -89,7 +89,7 @@ def curve_margin(p, x, mode, curves):
 
 @inline
 def curve_margin_slopes(p, x, mode, curves):
-    """Slopes of the margin by x and xd."""
+    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
     at = int(p[0])
     n = int(p[1])
     if mode <= 0:

@@ -30,7 +30,7 @@ NEAR = 1e-13
 
 
 def expression_data(record: OfFormulas, at: int) -> tuple[list[float], list[float]]:
-    """Parameters, and data that begin at place `at`."""
+    """The parameters of a law of formulas for kernels, and its data, which begin at place `at`."""
     made = record.program
     values = list(record.values.values())
     row = [*values, *[0.0] * (AT - len(values)), float(at)]
@@ -46,13 +46,13 @@ def expression_is_smooth(record: OfFormulas) -> bool:
 
 
 def expression_is_watched(record: OfFormulas) -> bool:
-    """Whether a switch depends on time other than linearly."""
+    """Whether a switch depends on time, other than linearly, so that steps have to be short."""
     return record.program.has_curved_switches
 
 
 @inline
 def expression_force(p, x, xd, mode, t, curves, l0):
-    """f, f_x, f_xd, V, V_x.
+    """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -66,7 +66,7 @@ def expression_force(p, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_slopes(p, place, x, xd, mode, t, curves, l0):
-    """df/dp, dV/dp.
+    """Slopes of force and energy by a parameter: df/dp, dV/dp.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     place: of the parameter.
@@ -82,7 +82,7 @@ def expression_slopes(p, place, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_rest_slopes(p, x, xd, mode, t, curves, l0):
-    """df/dl0, dV/dl0 at fixed elongation.
+    """Slopes of force and energy by the free length at fixed elongation: df/dl0, dV/dl0.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -104,7 +104,7 @@ def expression_is_timed(p, curves):
 
 @inline
 def expression_by_time(p, x, xd, mode, t, curves, l0):
-    """df/dt at fixed elongation and rate.
+    """Slope of the force by time at fixed elongation and rate: df/dt.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -122,7 +122,7 @@ def expression_by_time(p, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_unstretched(p, curves):
-    """The force at no elongation at the time 0, in any of the two modes in which all bits are alike."""
+    """The force at no elongation and time 0, the larger of two: with all switches on one side, or all on the other."""
     at = int(p[AT])
     one, _, _, _, _ = call_formula(curves[at], p, 0.0, 0.0, 0.0, 1.0, 0, FORCE)
     other, _, _, _, _ = call_formula(curves[at], p, 0.0, 0.0, 0.0, 1.0, 2 ** int(curves[at + 2]) - 1, FORCE)
@@ -133,7 +133,7 @@ def expression_unstretched(p, curves):
 
 @inline
 def expression_switches(p, curves):
-    """Whether there is a switch."""
+    """Whether the formulas of the law have switches."""
     return curves[int(p[AT]) + 2] > 0.0
 
 
@@ -201,7 +201,7 @@ def _lowest(p, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_sharp(p, x, xd, mode, t, curves, l0):
-    """Whether slopes of the force begin or end with a root at the switch whose margin is the smallest.
+    """Whether the slopes of the force grow like a root behind the switch whose margin is the smallest.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -219,7 +219,7 @@ def expression_sharp(p, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_margin(p, x, xd, mode, t, curves, l0):
-    """The smallest margin.
+    """The smallest margin of the switches: how far the mode is from its end.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -234,7 +234,7 @@ def expression_margin(p, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_margins(p, curves):
-    """How many margins there are."""
+    """How many margins a law has: one for each switch in its formulas."""
     return int(curves[int(p[AT]) + 2])
 
 
@@ -258,7 +258,7 @@ def expression_one_margin(p, which, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_margin_slopes(p, x, xd, mode, t, curves, l0):
-    """Its slopes by x and xd.
+    """Slopes of the smallest margin by x and xd.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -273,7 +273,7 @@ def expression_margin_slopes(p, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_margin_by_time(p, x, xd, mode, t, curves, l0):
-    """Its slope by time.
+    """Slope of the smallest margin by time.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -312,7 +312,7 @@ def _margin_by(p, place, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_margin_slope(p, place, x, xd, mode, t, curves, l0):
-    """Its slope by a parameter.
+    """Slope of the smallest margin by a parameter.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     place: of the parameter.
@@ -327,7 +327,7 @@ def expression_margin_slope(p, place, x, xd, mode, t, curves, l0):
 
 @inline
 def expression_margin_rest_slope(p, x, xd, mode, t, curves, l0):
-    """Its slope by the free length, at fixed elongation.
+    """Slope of the smallest margin by the free length, at fixed elongation.
 
     p (PARAMETERS,): its parameters, and where its data begin.
     x, xd: elongation (m) and its rate (m/s).
@@ -414,7 +414,8 @@ def expression_start(p, x, xd, xdd, t, curves, l0):
 
 @inline
 def expression_grazes(p, x, mode, t, curves, l0):
-    """What a margin that is only just used up (or not) does to derivatives: nothing 0, the force 1, the motion 2.
+    """How derivatives would change if a mode were only just left: not at all (0), by the force (1), by the motion
+    (2).
 
     As at a gap: a force that jumps changes the motion; one that begins with the rate changes itself, and the motion too
     where further switches may hold it on the way back.

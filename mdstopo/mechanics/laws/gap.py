@@ -15,7 +15,7 @@ NEAR = 1e-12
 
 @inline
 def gap_force(p, x, xd, mode):
-    """f, f_x, f_xd, V, V_x."""
+    """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x."""
     if mode == OPEN:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     y = p[3] * x - p[2]
@@ -33,13 +33,13 @@ def _clips(p):
 
 @inline
 def gap_idle(mode):
-    """Open, nothing acts."""
+    """Whether a member in this mode has no force: in the open one."""
     return mode == OPEN
 
 
 @inline
 def gap_margin(p, x, xd, mode):
-    """How far the mode is from its end: y in m, or the unclipped force by k + c, which may be all damping."""
+    """How far a member is from the end of its mode: y in m, or the force before it is cut off, divided by k + c."""
     y = p[3] * x - p[2]
     if mode == OPEN:
         return -y
@@ -51,7 +51,7 @@ def gap_margin(p, x, xd, mode):
 
 @inline
 def gap_margin_slopes(p, x, xd, mode):
-    """Slopes of the margin by x and xd."""
+    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
     if mode == OPEN:
         return -p[3], 0.0
     y = p[3] * x - p[2]
@@ -71,7 +71,7 @@ def gap_margin_slopes(p, x, xd, mode):
 
 @inline
 def gap_slopes(p, place, x, xd, mode):
-    """df/dp, dV/dp."""
+    """Slopes of force and energy by a parameter: df/dp, dV/dp."""
     if mode == OPEN:
         return 0.0, 0.0
     y = p[3] * x - p[2]
@@ -85,7 +85,7 @@ def gap_slopes(p, place, x, xd, mode):
 
 @inline
 def gap_margin_slope(p, place, x, xd, mode):
-    """Slope of the margin by a parameter."""
+    """The slope of the margin, which says how far the mode is from its end, by a parameter."""
     y = p[3] * x - p[2]
     unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1]) if _clips(p) else y
     if mode == OPEN or not _clips(p) or y <= (unclipped if mode == CLOSED else -unclipped):
@@ -106,7 +106,7 @@ def _closed(p, y, rate):
 
 @inline
 def gap_next(p, x, xd, xdd, mode):
-    """The mode to go to where this one's margin is negative.
+    """The mode that follows when the margin of this one is used up.
 
     Away from the gap its side decides, for a law may begin to act on a member that has moved meanwhile; at the gap
     the rate does, then the second derivative. In contact only the force can have changed its sign: the other mode
@@ -143,7 +143,8 @@ def gap_start(p, x, xd, xdd):
 
 @inline
 def gap_grazes(p, mode):
-    """What a touch that only just happens (or not) does to derivatives: nothing 0, the force 1, the motion 2.
+    """How derivatives would change if a mode were only just left: not at all (0), by the force (1), by the motion
+    (2).
 
     Touching by a depth y lasts sqrt(y). Damping gives a force that begins with the root of y; its impulse c (y - y) is
     nothing, unless clip takes the returning half away: then it is c y, which has a kink where nothing touches.

@@ -8,17 +8,17 @@ from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 @inline
 def given_force(value):
-    """f, f_x, f_xd, V, V_x."""
+    """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x."""
     return value, 0.0, 0.0, 0.0, 0.0
 
 
 def given_table(record: TableLaw) -> Table:
-    """Force over time."""
+    """The table of the force over time."""
     return record.table
 
 
 def given_breakpoints(record: TableLaw, _: bool) -> list[float]:
-    """The times of its rows."""
+    """Times at which steps have to end: those of the table's rows."""
     times: list[float] = record.table.times.tolist()
     return times
 

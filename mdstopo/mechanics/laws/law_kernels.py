@@ -27,7 +27,8 @@ Function = Kernel | Callable[..., Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Modes:
-    """A law that switches: smooth within a mode, in which a member stays until its margin is used up.
+    """The kernels of a law that switches: within a mode it is smooth, and a member stays in it until its margin is
+    used up.
 
     margin: how far the mode is from its end, not negative as long as it holds. margin_slopes: of it by x and xd.
     margin_slope: of it by the parameter at a place; None where no parameter that may vary is in it.
@@ -64,7 +65,8 @@ class Modes:
 
 @dataclass(frozen=True, kw_only=True)
 class PermanentSet:
-    """A law that remembers: its elongation counts from a permanent set, which grows where a mode gives way to another.
+    """The kernels of a law that remembers: its elongation counts from a permanent set, which grows where a mode
+    ends.
 
     growth (p, x, old, new): by how much in m. first (p, x, mode): what a member has that begins in a mode.
     is_made (old, new): whether the set is written down where `old` gives way to `new`, and not just left as it was.
@@ -82,7 +84,7 @@ class PermanentSet:
 
 @dataclass(frozen=True, kw_only=True)
 class LawKernels:
-    """A member law.
+    """The kernels of a member law, and what it can do.
 
     force: f, f_x, f_xd, V, V_x: force in N, its slopes by x and xd, stored energy in J and its slope by x.
     slopes: df/dp, dV/dp by the parameter at a place; None where no parameter may vary.

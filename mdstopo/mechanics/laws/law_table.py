@@ -45,7 +45,7 @@ def code_of(law: type[Law]) -> int:
 
 
 def enter(law: type[Law]) -> None:
-    """Give a law its code."""
+    """Give a law a code and add its kernels to the table."""
     if not hasattr(law, "kernels"):
         raise TypeError(f"no kernels are named for the law {law.__name__}")
     found = importlib.import_module(law.kernels).KERNELS
@@ -153,7 +153,7 @@ def law_unstretched(code, p, curves):
 
 @chosen(LISTED, lambda each: True if each.signal else None, inline)
 def law_is_given(code):
-    """Whether the force is given over time."""
+    """Whether the force of a law is given over time, whatever the motion."""
     return False
 
 
@@ -357,7 +357,8 @@ def law_start(code, p, x, xd, xdd, t, curves, l0):
 
 @chosen(LISTED, lambda each: each.modes and each.modes.grazes, inline)
 def law_grazes(code, p, x, mode, t, curves, l0):
-    """What a margin that is only just used up (or not) at x does to derivatives: nothing 0, force 1, motion 2.
+    """How derivatives would change if a mode were only just left at x: not at all (0), by the force (1), by the
+    motion (2).
 
     code: of the law.
     p (PARAMETERS,): its parameters.
@@ -372,7 +373,7 @@ def law_grazes(code, p, x, mode, t, curves, l0):
 
 @chosen(LISTED, lambda each: each.modes and each.modes.sharp, inline)
 def law_is_sharp(code, p, x, xd, mode, t, curves, l0):
-    """Whether slopes of the force begin with a root at the end of the mode that is nearest.
+    """Whether the slopes of the force grow like a root behind the nearest end of the mode.
 
     code: of the law.
     p (PARAMETERS,): its parameters.
@@ -390,7 +391,7 @@ def law_is_sharp(code, p, x, xd, mode, t, curves, l0):
 
 @chosen(LISTED, lambda each: True if each.permanent_set else None, inline)
 def law_remembers(code):
-    """Whether members have a permanent set."""
+    """Whether members with a law keep a permanent set."""
     return False
 
 
@@ -430,7 +431,8 @@ def law_set_slope(code, p, place):
 
 @chosen(LISTED, lambda each: each.permanent_set and each.permanent_set.divides, inline)
 def law_divides(code, p, x, xd, mode, near):
-    """Whether a member begins, within `near`, with a permanent set that depends on parameters on one side only.
+    """Whether a member begins within `near` of a state on whose other side its permanent set would depend on
+    parameters otherwise.
 
     code: of the law.
     p (PARAMETERS,): its parameters.

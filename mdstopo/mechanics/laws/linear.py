@@ -6,14 +6,14 @@ from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 @inline
 def linear_force(p, x, xd):
-    """f, f_x, f_xd, V, V_x."""
+    """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x."""
     pull = p[0] * x
     return pull + p[1] * xd + p[2], p[0], p[1], 0.5 * pull * x, pull
 
 
 @inline
 def linear_slopes(p, place, x, xd):
-    """df/dp, dV/dp."""
+    """Slopes of force and energy by a parameter: df/dp, dV/dp."""
     if place == 0:
         return x, 0.5 * x * x
     if place == 1:
@@ -23,7 +23,7 @@ def linear_slopes(p, place, x, xd):
 
 @inline
 def linear_unstretched(p):
-    """The preload."""
+    """The force at no elongation and rate: the preload (N)."""
     return abs(p[2])
 
 

@@ -9,14 +9,14 @@ from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 @inline
 def pulse_force(p, t):
-    """f, f_x, f_xd, V, V_x."""
+    """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x."""
     s = t - p[2]
     return p[0] * math.exp(-min(p[1] * min(s * s, 1e300), 745.0)), 0.0, 0.0, 0.0, 0.0
 
 
 @inline
 def pulse_slopes(p, place, t):
-    """df/dp, dV/dp."""
+    """Slopes of force and energy by a parameter: df/dp, dV/dp."""
     s = t - p[2]
     share = math.exp(-min(p[1] * min(s * s, 1e300), 745.0))
     if place == 0:
@@ -45,7 +45,7 @@ def pulse_breakpoints(record: PulseLaw, fine: bool) -> list[float]:
 
 @inline
 def pulse_unstretched(p):
-    """The peak."""
+    """The largest force at no elongation and rate: the peak of the pulse (N)."""
     return abs(p[0])
 
 

@@ -131,7 +131,7 @@ def elastic_force(member, width, scale, start, stop, r, close):
 
 @part
 def seen_members(member, width, i, r, close):
-    """R q, r, |r|^2, 1/L and Delta of the members from i on."""
+    """R q, vectors r between the ends, |r|^2, 1/L and elongations Delta of the members from i on, at one pose."""
     u = load(member, 2 * width + i)
     v = load(member, 3 * width + i)
     ax = r[2] * u - r[3] * v

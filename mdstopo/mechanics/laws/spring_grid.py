@@ -25,7 +25,7 @@ from mdstopo.mechanics.laws.sums import upper_triangle
 
 @kernel
 def seen_in_row(ax, ay, room, j):
-    """r, L^2 and 1/L of the members of row j."""
+    """Vectors r, squares of lengths and 1/L of the members of row j of the grid."""
     rx = ax + room[j, 0]
     ry = ay + room[j, 1]
     r2 = rx * rx + ry * ry
@@ -102,7 +102,7 @@ def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room
 
 @part
 def turned_columns(qx, qy, i, c, s):
-    """a of the columns from i on."""
+    """Points of the grid's columns from i on, turned with their body."""
     u = load(qx, i)
     v = load(qy, i)
     return c * u - s * v, s * u + c * v
@@ -159,14 +159,14 @@ def _weight(energy, seen, moved, k, l0, excess, at, close):
 
 @part
 def no_members():
-    """Sums over the members of a column: w, w r, and of g n n^T xx, xy and the trace; of none."""
+    """Sums over the members of a column, all zero: w, w r, and of g n n^T xx, xy and the trace."""
     nothing = zero()
     return nothing, nothing, nothing, nothing, nothing, nothing
 
 
 @part
 def add_member(own, rx, ry, y, w, g):
-    """The sums over the members of a column with one more in each, in vectors.
+    """Add one more member in each column to the sums over the members of columns, in vectors.
 
     own: the sums so far, as of `no_members`.
     rx, ry: r (m).
@@ -183,7 +183,7 @@ def add_member(own, rx, ry, y, w, g):
 
 @part
 def no_columns():
-    """Sums over columns: -Q, w and w a, and xx, xy, yy, xt, yt, tt of what K has besides these; of none."""
+    """Sums over columns, all zero: -Q, w and w a, and xx, xy, yy, xt, yt, tt of what K has besides these."""
     nothing = zero()
     return (
         (nothing, nothing, nothing),
@@ -194,7 +194,7 @@ def no_columns():
 
 @part
 def add_column(sums, ax, ay, own):
-    """The sums with a column more, whose members are summed in `own`."""
+    """Add the sums over one column, `own`, to the sums over columns."""
     (sum_x, sum_y, sum_t), (sum_w, sum_wx, sum_wy), (kxx, kxy, kyy, kxt, kyt, ktt) = sums
     w, x, y, gxx, gxy, trace = own
     gyy = trace - gxx
@@ -216,7 +216,7 @@ def add_column(sums, ax, ay, own):
 
 @part
 def force_and_tangent(sums):
-    """Q and the upper triangle of K."""
+    """The force Q and the upper triangle of the tangent K, from sums over members."""
     (sum_x, sum_y, sum_t), weights, tangent = sums
     return (-total(sum_x), -total(sum_y), -total(sum_t)), upper_triangle(*tangent, *weights)
 
@@ -286,7 +286,7 @@ def _add(own, energy, seen, moved, k, l0, excess, at, close):
 
 @kernel
 def seen_at(turned, room, j, m):
-    """r, L^2 and 1/L of the members of row j at pose m."""
+    """Vectors r, squares of lengths and 1/L of the members of row j at pose m."""
     rx = load(turned[m, 0], 0) + room[j, m, 0]
     ry = load(turned[m, 1], 0) + room[j, m, 1]
     r2 = rx * rx + ry * ry
@@ -295,7 +295,7 @@ def seen_at(turned, room, j, m):
 
 @kernel
 def moved_at(turned, m):
-    """What `moved_columns` gave at pose m."""
+    """The columns of the grid at pose m, as `moved_columns` gave them."""
     return load(turned[m, 2], 0), load(turned[m, 3], 0), load(turned[m, 4], 0)
 
 
