@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel, member_kernel, vector_entry
+from mdstopo.compiler.jit import member_kernel, vector_entry
 from mdstopo.optimizer import cones
-from mdstopo.optimizer.interior_kernels import add, dot, put
+from mdstopo.optimizer.interior_kernels import add, centred_gap, dot, put
 from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.optimizer.reduced import Curved, Factored, Rows, factor, solve, times
 
@@ -66,15 +66,6 @@ class Parts(NamedTuple):
     limit: int
     elastic: int
     total: int
-
-
-@kernel
-def _aim(gap: float, share: float) -> float:
-    """The gap to aim for: gap times share cubed (Mehrotra).
-
-    In a `member_kernel` LLVM may order the factors, which it does otherwise in some processes: last bits would differ.
-    """
-    return (share * share) * (share * gap)
 
 
 @vector_entry
@@ -264,7 +255,7 @@ def _advance(
             for k in range(len(p.excess)):
                 for i in range(3):
                     after += (cone[0, k, i] + a * step_cone[0, k, i]) * (cone[1, k, i] + a * step_cone[1, k, i])
-            target = _aim(gap, min(1.0, max(0.0, after / count / gap))) if gap > 0.0 else 0.0
+            target = centred_gap(gap, min(1.0, max(0.0, after / count / gap))) if gap > 0.0 else 0.0
     if not a > LEAST:
         return False
     for side in range(2):

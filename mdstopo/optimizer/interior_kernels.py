@@ -20,7 +20,7 @@ small elimination at the end.
 
 import numpy as np
 
-from mdstopo.compiler.jit import member_kernel, vector_entry
+from mdstopo.compiler.jit import kernel, member_kernel, vector_entry
 from mdstopo.optimizer.powers import powers
 from mdstopo.optimizer.problem import Floats, Ints
 
@@ -324,6 +324,21 @@ def eliminate(matrix: Floats, right: Floats, solution: Floats) -> bool:
     return True
 
 
+@kernel
+def centred_gap(gap: float, share: float) -> float:
+    """The gap that a corrector aims for: gap times share cubed, share of it that the predictor leaves (Mehrotra).
+
+    In a `member_kernel` LLVM may order the factors, which it does otherwise in some processes: last bits would differ.
+    """
+    return (share * share) * (share * gap)
+
+
+@kernel
+def corrector_gap(gap: float, total: float, after: float) -> float:
+    """`centred_gap` for sums of all products before and after the predictor's step, of which `gap` is the mean."""
+    return centred_gap(gap, min(1.0, max(0.0, after / total)))
+
+
 @member_kernel
 def _rows_right(kind: Ints, rhs: Floats, miss: Floats, rows: Floats, aims: Floats, rz: float, right: Floats) -> None:
     """The right side of the system for the steps of the rows' multipliers and of z, for the present targets.
@@ -489,7 +504,7 @@ def interior_loop(
             keep = 1.0 if corrector == 0 else max(0.99, 1.0 - total / count)
             ap, ad = keep / max(keep, p, p_rows), keep / max(keep, q, q_rows)
             after = total + ap * (zdw + u1) + ad * (wdz + u2) + ap * ad * (dwdz + u3)
-            target = total / count * min(1.0, max(0.0, after / total)) ** 3
+            target = corrector_gap(total / count, total, after)
         move(bounds, work, ap, ad)
         z += float(ap * change[K])
         for a in range(K):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdstopo.compiler.jit import member_kernel
+from mdstopo.compiler.jit import kernel, member_kernel
 from mdstopo.optimizer.interior_kernels import add, dot, put
 from mdstopo.optimizer.problem import Floats, Ints
 
@@ -72,7 +72,7 @@ def times(P: Curved, x: Floats, out: Floats) -> None:
         add(out, P.weight[k] * dot(P.factor[k], x), P.factor[k])
 
 
-@member_kernel
+@kernel
 def by_variables(variables: int, others: int) -> bool:
     """Whether the system of the variables is the cheaper one; others: the curvature's rank and the rows."""
     v, r = float(variables), float(others)

@@ -14,7 +14,7 @@ are those of `interior_kernels`; there a variable without bounds has both `AWAY`
 import numpy as np
 
 from mdstopo.compiler.jit import member_kernel, vector_entry
-from mdstopo.optimizer.interior_kernels import _dot3, add, correct, direct, dot, eliminate, move
+from mdstopo.optimizer.interior_kernels import _dot3, add, correct, corrector_gap, direct, dot, eliminate, move
 from mdstopo.optimizer.problem import Floats, Ints
 
 BLOCK = 1024
@@ -266,7 +266,7 @@ def interior(
             # one length for both: the program is quadratic
             ap = keep / max(keep, max(max(p, p_rows), max(q, q_rows)))
             after = total + ap * (zdw + u1 + wdz + u2) + ap * ap * (dwdz + u3)
-            target = total / count * min(1.0, max(0.0, after / total)) ** 3
+            target = corrector_gap(total / count, total, after)
         if not (solved and ap > 1e-14):
             break
         move(bounds, work, ap, ap)
