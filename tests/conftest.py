@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests import times
+from tests import tiers, times
 from tests.entries import hold_calls
 from tests.tiers import mark, without_test
 
@@ -23,6 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Hold calls of entries to the wheel's table; refuse to begin where programs that tests start would be those of
     another checkout."""
+    tiers.begin(config)
     hold_calls()
     times.begin(config)
     if hasattr(config, "workerinput"):

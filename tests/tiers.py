@@ -1,7 +1,8 @@
 """Which tests `make test` leaves out, for their time: they have the mark `thorough`; `make test-all` runs them, too.
 
 Every promise keeps a test among the others. What is listed here repeats one with another integrator, method, law or
-scene; is a whole application; or compiles kernels that few cases need.
+scene; is a whole application; or compiles kernels that few cases need. Of a property that holds for any example
+`make test` tries fewer of them (`examples`).
 """
 
 import pytest
@@ -24,7 +25,6 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "bench/test_optimum.py": ("rows[belts product", "rows[machine"),
     "bench/test_peers.py": ("installed_peers", "jax_moves_as_ours"),
     "bench/test_peers_in_space.py": ("installed_peers",),
-    "case/test_schema.py": ("in_many_more_cases",),
     "cli/test_cli_commands.py": ("goes_on[2-", "goes_on[1-pareto"),
     "cli/test_finalize.py": ("a_fixed_step_is_verified",),
     "cli/test_plot_export_new.py": ("starter_case_is_right",),
@@ -77,7 +77,6 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "general/test_methods.py": ("motions[generalized_alpha",),
     "general/test_peak_search.py": ("-alpha]",),
     "general/test_projection.py": ("",),
-    "general/test_random_scenes.py": ("many_more",),
     "general/test_row_sweep.py": ("-alpha]", "[everything-"),
     "general/test_settle_kinks.py": ("[1", "[2", "[3"),
     "general/test_since_settled.py": ("implicit",),
@@ -147,6 +146,22 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "variables/test_shared.py": ("mirrored_halves",),
     "variables/test_stages.py": ("any_number_of_processes", "commands_tell_the_stages", "stopped_anywhere"),
 }
+
+
+class _Run:
+    """What is run: `make test` sets this before tests are imported."""
+
+    is_quick = False
+
+
+def begin(config: pytest.Config) -> None:
+    """Note whether thorough tests are left out."""
+    _Run.is_quick = config.getoption("markexpr") == "not thorough"
+
+
+def examples(quick: int, thorough: int) -> int:
+    """How many random examples of a property are tried: by `make test`, and by `make test-all` or a test alone."""
+    return quick if _Run.is_quick else thorough
 
 
 def _parts(node: str) -> tuple[str, str]:

@@ -14,6 +14,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.nodes import MAPPING, SEQUENCE, Node, parse
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.schema_case import json_schema
+from tests.tiers import examples
 
 from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL
 
@@ -92,23 +93,9 @@ VALUES += [[[0, 1], [2, 3]], {"file": 3}, {"table": [[0, 1]]}, {"table": []}, ["
 NEW = st.sampled_from([DROP, *VALUES])
 
 
-changes = given(source=st.sampled_from(SOURCES), new=NEW, choose=st.randoms(use_true_random=False))
-
-
-@changes
-@settings(max_examples=60, deadline=None, derandomize=True)
+@given(source=st.sampled_from(SOURCES), new=NEW, choose=st.randoms(use_true_random=False))
+@settings(max_examples=examples(60, 400), deadline=None, derandomize=True)
 def test_what_the_schema_refuses_the_reader_refuses(source: Any, new: Any, choose: Any) -> None:
-    the_reader_refuses(source, new, choose)
-
-
-@changes
-@settings(max_examples=400, deadline=None, derandomize=True)
-def test_what_the_schema_refuses_the_reader_refuses_in_many_more_cases(source: Any, new: Any, choose: Any) -> None:
-    the_reader_refuses(source, new, choose)
-
-
-def the_reader_refuses(source: Any, new: Any, choose: Any) -> None:
-    """Change a case at some place, and see that the reader refuses it where the schema does."""
     from mdstopo.case.overrides import as_yaml
 
     changed = with_value(source, choose.choice(places(source)), new)
