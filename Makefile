@@ -88,7 +88,7 @@ test-all: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
 
 test-times: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile -m 'not thorough' --times results/test-times.jsonl $(TESTS)
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile -m 'not thorough' --times $(TESTS)
 
 # What a plain installation, pictures and a cluster need, each at its lower bound; the tools of development as they are.
 $(LOWEST)/.ready: pyproject.toml

@@ -1,4 +1,4 @@
-"""Where the time of tests goes: `--times FILE` writes it of each test, and a summary ends the run (`make test-times`).
+"""Where the time of tests goes: `--times` writes it of each test, and a summary ends the run (`make test-times`).
 
 Seconds of the processor, so that a busy machine changes little: of a test itself, of programs that it starts and waits
 for, and of kernels compiled within it. What two tests share, a kernel or a fixture of a module, counts for the first
@@ -18,6 +18,8 @@ import pytest
 
 from mdstopo.compiler.entry import Entry
 
+#: a line of JSON for each test, from the root of the project
+FILE = "results/test-times.jsonl"
 #: how many tests, files and entries a summary names
 SHOWN = 40
 
@@ -93,7 +95,7 @@ class Account:
     """Gathers what processes have noted, in the one that gives tests out."""
 
     def __init__(self, file: Path) -> None:
-        self._file = file
+        self._file = file.open("w", encoding="utf-8", buffering=1)
         self._tests: list[dict[str, Any]] = []
         self._workers: list[float] = []
 
@@ -103,6 +105,7 @@ class Account:
         if found is not None:
             *spent, entries = found  # type: ignore[misc]
             self._tests.append({"test": report.nodeid, **Spent(*spent)._asdict(), "entries": entries})
+            self._file.write(json.dumps(self._tests[-1]) + "\n")
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
@@ -112,8 +115,8 @@ class Account:
             self._workers.append(spent[0])
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        """Write all, and what takes most."""
-        self._file.write_text("".join(json.dumps(each) + "\n" for each in self._tests))
+        """Tell what takes most."""
+        self._file.close()
         for line in self._lines():
             terminalreporter.write_line(line)
 
@@ -146,15 +149,14 @@ def _largest(what: str, spent: Any) -> Iterator[str]:
 
 def add_option(parser: pytest.Parser) -> None:
     """Enter `--times`."""
-    parser.addoption("--times", metavar="FILE", help="write of each test where its time went, and tell what takes most")
+    parser.addoption("--times", action="store_true", help=f"write of each test where its time went, into {FILE}")
 
 
 def begin(config: pytest.Config) -> None:
-    """Count where `--times` is given."""
-    file = config.getoption("times")
-    if file is None:
+    """Count, where that is asked for."""
+    if not config.getoption("times"):
         return
     if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
         config.pluginmanager.register(Times())
     if not hasattr(config, "workerinput"):
-        config.pluginmanager.register(Account(Path(file)))
+        config.pluginmanager.register(Account(config.rootpath / FILE))
