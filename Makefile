@@ -3,6 +3,7 @@
 #   make run                      set up .venv, optimise cases/fig6.yaml, write results/fig6.h5
 #   make test                     set up .venv with the tools of development, run the tests
 #   make test-all                 the thorough tests, too (tests/tiers.py): some 20 minutes
+#   make test-times               the tests, and where their time goes: by test, file and compiled kernel
 #   make test-lowest              all of them with the lowest versions of dependencies that pyproject.toml allows
 #   make test-numba               kernels, gradients and warm starts with the oldest, a middle and the newest Numba
 #   make lint, make types         ruff, and who may import whom; mypy
@@ -42,10 +43,10 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test test-all test-lowest test-numba lint types docs reproduce gallery bench peers readme wheel try-wheel clean
+.PHONY: help run test test-all test-times test-lowest test-numba lint types docs reproduce gallery bench peers readme wheel try-wheel clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,18p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,19p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -54,8 +55,9 @@ $(VENV)/.ready: pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable .
 	@touch $@
 
+# Only what is missing: the package is there and stays as it is, so something may run meanwhile.
 $(VENV)/.ready-dev: $(VENV)/.ready
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet 'mdstopo[dev]'
 	@touch $@
 
 # An unfinished run goes on where it stopped; a finished one is replaced, with a notice.
@@ -84,6 +86,9 @@ test: $(VENV)/.ready-dev
 
 test-all: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
+
+test-times: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile -m 'not thorough' --times $(TESTS)
 
 # What a plain installation, pictures and a cluster need, each at its lower bound; the tools of development as they are.
 $(LOWEST)/.ready: pyproject.toml

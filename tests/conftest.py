@@ -8,16 +8,24 @@ from pathlib import Path
 
 import pytest
 
+from tests import tiers, times
 from tests.entries import hold_calls
 from tests.tiers import mark, without_test
 
 _WHERE = "import importlib.util as u; found = u.find_spec('mdstopo'); print(found and found.origin or '')"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Options of our own."""
+    times.add_option(parser)
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Hold calls of entries to the wheel's table; refuse to begin where programs that tests start would be those of
     another checkout."""
+    tiers.begin(config)
     hold_calls()
+    times.begin(config)
     if hasattr(config, "workerinput"):
         return  # the process that gives the tests out has asked
     asked = [sys.executable, "-P", "-c", _WHERE]

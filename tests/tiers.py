@@ -1,7 +1,8 @@
 """Which tests `make test` leaves out, for their time: they have the mark `thorough`; `make test-all` runs them, too.
 
 Every promise keeps a test among the others. What is listed here repeats one with another integrator, method, law or
-scene; is a whole application; or compiles kernels that few cases need.
+scene; is a whole application; or compiles kernels that few cases need. Of a property that holds for any example
+`make test` tries fewer of them (`examples`).
 """
 
 import pytest
@@ -116,6 +117,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "space/test_half_turns_looked_at.py": ("without_an_error_estimate",),
     "space/test_implicit_steps.py": ("",),
     "space/test_law_parameters.py": ("",),
+    "space/test_movable_in_space.py": ("slopes[all",),
     "space/test_names_in_space.py": ("",),
     "space/test_orders_in_space.py": ("[gauss",),
     "space/test_windows.py": ("",),
@@ -144,6 +146,22 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "variables/test_shared.py": ("mirrored_halves",),
     "variables/test_stages.py": ("any_number_of_processes", "commands_tell_the_stages", "stopped_anywhere"),
 }
+
+
+class _Run:
+    """What is run: `make test` sets this before tests are imported."""
+
+    is_quick = False
+
+
+def begin(config: pytest.Config) -> None:
+    """Note whether thorough tests are left out."""
+    _Run.is_quick = config.getoption("markexpr") == "not thorough"
+
+
+def examples(quick: int, thorough: int) -> int:
+    """How many random examples of a property are tried: by `make test`, and by `make test-all` or a test alone."""
+    return quick if _Run.is_quick else thorough
 
 
 def _parts(node: str) -> tuple[str, str]:

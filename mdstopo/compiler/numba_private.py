@@ -844,8 +844,8 @@ def enter_threads(shared: Callable[..., Any] = threads.shared, taken: Callable[.
 
         def generic(self, asked: Any, _named: Any) -> Any:
             kernel, _, job = asked
-            kernel.get_call_type(self.context, tuple(job.types), {})  # compiles it
-            return signature(types.none, kernel, types.int64, job)
+            found = kernel.get_call_type(self.context, tuple(job.types), {})  # compiles it
+            return signature(types.none, kernel, types.int64, types.BaseTuple.from_types(found.args))
 
     infer_global(taken)(TakenTyped)
     infer_global(shared)(SharedTyped)
@@ -977,6 +977,14 @@ class _Dispatcher(CPUDispatcher):
 
     targetdescr = _OwnTarget(_TARGET)
 
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """What a call is of. A number that is written in the call has the type of any other: Numba would compile the
+        function once more for every such number. Where sums may be reordered it does, for their order may depend on
+        numbers that are known."""
+        if _LEAN and not self.targetoptions.get("fastmath"):
+            args, kws = tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(args, kws)
+
     def compile(self, sig: Any) -> Any:
         """Compile for these types. What calls in it are of is found out for our target, too, where Numba asks late."""
         with target_override(_TARGET):
@@ -1009,6 +1017,27 @@ def _enter_target() -> None:
 
 
 _LASTING = (types.Number, types.Boolean, types.Literal, types.Array, types.BaseTuple)
+
+
+def _spare_registries() -> None:
+    """Before every function Numba imports all that may have something to register: at the first one is enough, and
+    then what has been registered since is taken from those that it came to."""
+    for context in (_Dispatcher.targetdescr.typing_context, _Dispatcher.targetdescr.target_context):
+        _load_once(context)
+
+
+def _load_once(context: Any) -> None:
+    whole = context.load_additional_registries
+    known: list[Any] = []
+
+    def load() -> None:
+        if not known:
+            whole()
+            known.extend(context._registries)
+        for each in known:
+            context.install_registry(each)
+
+    context.load_additional_registries = load
 
 
 def _remember_signatures() -> None:
@@ -1252,6 +1281,7 @@ _enter_target()
 _name_flags_in_order()
 if _LEAN:
     _enter_sizes()
+    _spare_registries()
     _remember_signatures()
     _spare_flags()
     _spare_variables()

@@ -201,8 +201,8 @@ class Bundle:
     def with_rejected(self, seen: "Bundle", below: Floats) -> "Bundle":
         """These rows with those of a rejected trial, seen from the iterate, as the newest ones that are not its own.
 
-        At most a quarter of the rows that may be kept are one trial's, those nearest to carrying a multiplier there. below (K,): how far each
-        is from that, as `Bundle.below` tells it.
+        At most a quarter of the rows that may be kept are one trial's: those nearest to carrying a multiplier there.
+        below (K,): how far each is from that, as `Bundle.below` tells it.
         """
         most = max(self._most() // 4, LEAST)
         nearest = np.sort(np.argsort(below, kind="stable")[:most])

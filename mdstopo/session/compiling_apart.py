@@ -2,9 +2,9 @@
 
 Why it is not this one, `starts.getting_ready` tells. Another process is this module run as a program: alone it compiles
 all that the case needs; with the word `back` what the optimiser needs and what looks back at steps that were made. For
-scenes with joints and other laws both run side by side, the longest entries first, and what the one has compiled the
-other finds on the disk. Where nothing is optimised, one process beside this one has a share of its own, `responses` or
-`steps`: `compiling_in_background`.
+scenes with joints and other laws both run side by side, and what the one has compiled the other finds on the disk.
+Where nothing is optimised, one process beside this one has a share of its own, `responses` or `steps`:
+`compiling_in_background`.
 """
 
 import contextlib
@@ -148,12 +148,16 @@ def _main() -> None:
 
 
 def _compile_back(case: Case) -> None:
-    """Compile what looks back at steps, and the optimiser."""
+    """Compile the optimiser, and what looks back at steps.
+
+    In this order: meanwhile the other process gets on with forces and joints, which what looks back calls as well and
+    then finds on the disk.
+    """
     engine = evaluator_of(case, in_background=False)
-    engine.compile_responses()
     meet(case, FEW)
     if getattr(problem_of(engine, even(case)), "competes", False):
         meet(case, FEW, competes=True)
+    engine.compile_responses()
 
 
 def _compile_all(case: Case) -> None:

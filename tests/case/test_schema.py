@@ -14,6 +14,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.nodes import MAPPING, SEQUENCE, Node, parse
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.schema_case import json_schema
+from tests.tiers import examples
 
 from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL
 
@@ -93,7 +94,7 @@ NEW = st.sampled_from([DROP, *VALUES])
 
 
 @given(source=st.sampled_from(SOURCES), new=NEW, choose=st.randoms(use_true_random=False))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=examples(60, 400), deadline=None, derandomize=True)
 def test_what_the_schema_refuses_the_reader_refuses(source: Any, new: Any, choose: Any) -> None:
     from mdstopo.case.overrides import as_yaml
 

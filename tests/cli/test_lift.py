@@ -17,6 +17,7 @@ from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.start_rotations import about_axis
 from mdstopo.cli.group import run_group
 from mdstopo.finalize.lift_case import lifted
+from tests.tiers import examples
 
 CASES = Path(__file__).parents[2] / "cases"
 PLANAR = """\
@@ -152,7 +153,7 @@ def test_the_case_in_space_is_the_same_scene(spot: tuple[tuple[float, float, flo
 
 
 @given(axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1), angle=st.floats(0.01, 6))
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=examples(6, 15), deadline=None, derandomize=True)
 def test_any_plane_has_the_same_scene(axis: tuple[float, float, float], angle: float) -> None:
     planar = read_case(PLANAR)
     same_scene(planar, read_case(lifted(planar, axis, angle)), about_axis(axis, angle))

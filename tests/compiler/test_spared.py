@@ -72,6 +72,53 @@ def test_an_error_tells_the_calls_that_it_happened_in() -> None:
     assert words.count("During: Pass nopython_type_inference") == 2
 
 
+@kernel
+def _in_place(pair, k):
+    return 10.0 * pair[k] + k
+
+
+@entry
+def with_numbers(x):
+    """Numbers written in calls, alone and in a tuple, beside ones that are computed."""
+    total = 0.0
+    for k in range(2):
+        total = _sum(total, _in_place((x, 2.0), k) + _in_place((3.0, x), 1))
+    return total + _in_place((5, 7), 0) + _in_place((x, x), 1) + _in_place((1, 2), int(x))
+
+
+def test_a_kernel_is_compiled_once_whatever_number_is_written_in_a_call() -> None:
+    with_numbers.dispatcher.compile("(float64,)")
+    assert len(_in_place.dispatcher.overloads) == 2  # of floats, of integers
+    expected = 15.0 + 21.0 + 2 * 16.0 + 50.0 + 16.0 + 21.0
+    assert with_numbers(1.5) == expected
+
+
+def test_what_is_registered_between_compilations_is_found() -> None:
+    from numba.core.errors import TypingError
+    from numba.extending import overload
+
+    def late(x):  # type: ignore[no-untyped-def]
+        raise NotImplementedError
+
+    def calls():  # type: ignore[no-untyped-def]
+        @entry
+        def call(x):  # type: ignore[no-untyped-def]
+            return late(x)
+
+        return call
+
+    with pytest.raises(TypingError):
+        calls().dispatcher.compile("(float64,)")
+
+    @overload(late)
+    def _late(x):  # type: ignore[no-untyped-def]
+        return lambda x: 2.0 * x
+
+    found = calls()
+    found.dispatcher.compile("(float64,)")
+    assert len(found.dispatcher.overloads) == 1
+
+
 def test_cycles_are_looked_for_again_after_a_compilation() -> None:
     from mdstopo.compiler.kernel import way
 

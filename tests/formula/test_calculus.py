@@ -12,6 +12,7 @@ from mdstopo.formula.calculus import derivative, simplified, substituted
 from mdstopo.formula.formula_values import value_of
 from mdstopo.formula.parser import parse
 from mdstopo.formula.tree import name, number, parts, text_of
+from tests.tiers import examples
 
 from .random_formulas import evaluate, formulas
 
@@ -21,7 +22,7 @@ XS, KS = (-1.7341, -0.6123, 0.2937, 0.8713, 1.9127), (0.6377, 1.3291, 2.4173)
 
 
 @given(formulas(), st.sampled_from(XS), st.sampled_from(KS), st.sampled_from("xk"))
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=examples(120, 400), deadline=None, derandomize=True)
 def test_derivatives_are_those_of_complex_steps(text: str, x: float, k: float, word: str) -> None:
     values = {"x": x, "k": k}
     root = parse(text).root
@@ -41,7 +42,7 @@ def test_derivatives_are_those_of_complex_steps(text: str, x: float, k: float, w
 
 
 @given(formulas(), st.sampled_from(XS), st.sampled_from(KS))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=examples(60, 200), deadline=None, derandomize=True)
 def test_simplification_changes_no_value(text: str, x: float, k: float) -> None:
     values = {"x": x, "k": k}
     root = parse(text).root

@@ -13,6 +13,7 @@ from mdstopo.formula.idle import Idle
 from mdstopo.formula.law_formulas import FORCE, Program, program
 from mdstopo.formula.smooth_modes import TooManySwitchesError
 from tests.formula.random_formulas import formulas
+from tests.tiers import examples
 
 
 def idle(force: str | None, energy: str | None, *names: str, damping: str | None = None) -> tuple[Idle, ...]:
@@ -53,7 +54,7 @@ def values_at(made: Program, mode: int, **values: float) -> list[float]:
     return [value_of(each, {**names, **values}) for each in made.groups[FORCE].values]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(20, 60), deadline=None)
 @given(
     text=formulas(depth=3), gate=st.sampled_from(("step(x - 1)*({})", "if(x < k, 0, {})", "max(0, {})")), data=st.data()
 )

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 import mdstopo
 from mdstopo.case.reader import read_case
 from tests.general.support import slopes
+from tests.tiers import examples
 
 LAWS = (
     "{{type: spring, stiffness: {a}, damping: {b}, preload: {c}}}",
@@ -71,7 +72,7 @@ def scene(seed):
     return "\n".join(lines) + "\n"
 
 
-@settings(max_examples=25, derandomize=True, deadline=None)
+@settings(max_examples=examples(8, 40), derandomize=True, deadline=None)
 @given(st.integers(0, 10**6))
 def test_gradients_of_random_scenes_are_exact(seed):
     case = read_case(scene(seed))

@@ -5,9 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdstopo.integrators.banded import factorise, half_width, solve
+from tests.tiers import examples
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(15, 40), deadline=None)
 @given(st.integers(1, 14), st.integers(0, 6), st.integers(0, 10_000))
 def test_solves_what_dense_elimination_solves(n, half, seed):
     rng = np.random.default_rng(seed)

@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,13 +25,16 @@ def described(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
     named = ELSEWHERE.search(ast.get_docstring(function) or "")
     if named is None or named[2] != function.name:
         return False
-    (path,) = (ROOT / "mdstopo").rglob(f"{named[1]}.py")
-    there = [
-        each
-        for each in ast.parse(path.read_text(encoding="utf-8")).body
-        if isinstance(each, ast.FunctionDef) and each.name == named[2]
-    ]
+    there = [each for each in interface(named[1]) if each.name == named[2]]
     return [arguments(each) for each in there] == [arguments(function)]
+
+
+@cache
+def interface(name: str) -> list[ast.FunctionDef]:
+    """The functions of an interface's module."""
+    (path,) = (ROOT / "mdstopo").rglob(f"{name}.py")
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    return [each for each in body if isinstance(each, ast.FunctionDef)]
 
 
 def unnamed(source: str) -> Iterator[tuple[int, str, list[str]]]:

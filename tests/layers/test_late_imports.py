@@ -8,6 +8,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 Late = tuple[str, str]
+#: an import inside something: most modules have none and need not be parsed
+INDENTED = re.compile(r"^ +(import|from) ", re.MULTILINE)
 
 
 def listed() -> list[tuple[list[str], list[str]]]:
@@ -27,7 +29,10 @@ def late() -> tuple[Late, ...]:
     """File and module of each import inside a function of the package."""
     found: list[Late] = []
     for path in sorted((ROOT / "mdstopo").rglob("*.py")):
-        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        source = path.read_text(encoding="utf-8")
+        if not INDENTED.search(source):
+            continue
+        for function in ast.walk(ast.parse(source)):
             if not isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 continue
             for node in ast.walk(function):

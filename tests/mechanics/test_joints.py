@@ -18,6 +18,7 @@ from mdstopo.mechanics.joints.joint_table import CODES, WIDTH, describe, kernels
 from mdstopo.mechanics.joints.revolute import PLACES, place_joint
 from mdstopo.scene.springs_model import HOME
 from tests.compiled import compiled
+from tests.tiers import examples
 
 #: how many rows each has
 ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
@@ -28,7 +29,7 @@ FORCE, MOMENT = 0, 1
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
 seeds = st.integers(0, 2**32 - 1)
-many = settings(max_examples=25, deadline=None, derandomize=True)
+many = settings(max_examples=examples(8, 25), deadline=None, derandomize=True)
 
 
 @kernel

@@ -36,6 +36,7 @@ from mdstopo.mechanics.laws.law_table import CODES, PARAMETERS, parameters
 from mdstopo.mechanics.laws.law_table import breakpoints as law_breakpoints
 from mdstopo.scene.signal_segments import breakpoints
 from tests.compiled import compiled
+from tests.tiers import examples
 
 ROOT = Path(__file__).resolve().parents[2]
 OPEN, CLOSED, CLIPPED = gap.OPEN, gap.CLOSED, gap.CLIPPED
@@ -51,7 +52,7 @@ ELSEWHERE = {
 TIME, REST = 0.0, 1.0
 
 seeds = st.integers(0, 2**32 - 1)
-many = settings(max_examples=60, deadline=None, derandomize=True)
+many = settings(max_examples=examples(20, 60), deadline=None, derandomize=True)
 
 
 # Kernels have no Python wrapper: these are their callers.
@@ -730,7 +731,7 @@ def test_a_curve_is_pchip_inside_and_linear_outside(seed):
         assert f == pytest.approx(pieces(end) + beyond * pieces(end, 1), rel=1e-10, abs=1e-10)
 
 
-@settings(many, max_examples=25)
+@settings(many, max_examples=examples(8, 25))
 @given(seeds)
 def test_the_energy_of_a_curve_is_its_integral_from_no_elongation(seed):
     kernel, _, _, rng = drawn("curve", seed)

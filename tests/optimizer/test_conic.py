@@ -12,6 +12,7 @@ from mdstopo.optimizer.curvature import Curvature, learnt
 from mdstopo.optimizer.problem import LinearRows
 from mdstopo.optimizer.reduced import Curved, Rows
 from tests.space.in_python import in_python  # noqa: F401  # a fixture
+from tests.tiers import examples as examples_of
 
 
 def no_lines(n):
@@ -57,7 +58,7 @@ def values(p, d):
     )
 
 
-@examples(max_examples=40, deadline=None)
+@examples(max_examples=examples_of(15, 40), deadline=None)
 @given(
     n=st.integers(1, 60),
     lines=st.integers(1, 20),

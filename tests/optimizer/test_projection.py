@@ -9,11 +9,12 @@ from scipy.optimize import minimize
 
 from mdstopo.optimizer.nearest_feasible import InfeasibleRows, project, satisfied
 from mdstopo.optimizer.problem import LinearRows
+from tests.tiers import examples
 
 from .toys import volume
 
 
-@hypothesis_settings(max_examples=100, deadline=None, derandomize=True)
+@hypothesis_settings(max_examples=examples(40, 100), deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 40), equal=st.booleans(), mixed=st.booleans())
 def test_one_row_agrees_with_bisection(seed, n, equal, mixed):
     rng = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from mdstopo.optimizer.approximation import Approximation
 from mdstopo.optimizer.problem import LinearRows
 from mdstopo.optimizer.subproblem import solve
+from tests.tiers import examples
 
 POWERS = [1.0, 0.9, 0.5, 0.0, -1.0, -2.0]
 
@@ -87,7 +88,7 @@ def test_optimality_conditions_hold_to_rounding(power, n_obj, n_con, m, kappa):
         assert value < 2e-8, name
 
 
-@hypothesis_settings(max_examples=60, deadline=None, derandomize=True)
+@hypothesis_settings(max_examples=examples(20, 60), deadline=None, derandomize=True)
 @given(
     seed=st.integers(0, 10**6),
     n=st.integers(1, 12),

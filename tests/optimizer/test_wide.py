@@ -18,6 +18,7 @@ from mdstopo.optimizer.state import State
 from mdstopo.optimizer.wide_kernels import COARSER, FEWEST
 from mdstopo.optimizer.wide_slots import BEYOND, ROOM, ROW, SLOTS, WHOLE, bracket_slots, enter_slot, root
 from mdstopo.settings.optimizer_presets import settings
+from tests.space.in_python import in_python  # noqa: F401  # a fixture
 
 N = 12_000
 SIZES = [wide.MANY, 1_020, N]
@@ -181,7 +182,6 @@ def test_linear_terms_take_steps_of_any_length_beside_their_shifts(n, shift):
         assert new.promised - state.objective == pytest.approx(promised, rel=1e-9, abs=1e-12 * abs(state.objective))
 
 
-@vector_entry
 def rooted(numbers, x, goal, guess, power, room, whole):
     n = numbers.shape[1]
     slots, place = np.empty((SLOTS, n)), np.empty(n, np.int64)
@@ -192,6 +192,7 @@ def rooted(numbers, x, goal, guess, power, room, whole):
     return root(slots, n, ends, x, goal, 0.0, guess, BEYOND, power, 1e-12, np.bool_(True), room, whole)[0]
 
 
+@pytest.mark.usefixtures("in_python")
 def test_who_comes_to_an_end_of_the_box_at_the_last_moment_is_where_the_multiplier_has_it():
     """Newton's iteration of the multiplier moves those that were inside, and must not end where another joins them."""
     n, power, rng = 64, -1.0, np.random.default_rng(0)

@@ -14,6 +14,7 @@ from mdstopo.plan.front_plan import Front
 from mdstopo.plan.solve_task import Found
 from mdstopo.status import RunStatus
 from tests.front.support import CASE
+from tests.tiers import examples
 
 sets = st.integers(1, 4).flatmap(
     lambda m: st.lists(st.lists(st.integers(0, 6), min_size=m, max_size=m), min_size=1, max_size=9)
@@ -27,14 +28,14 @@ def cells(points, reference):
     return int((points[None] <= corners[:, None]).all(axis=2).any(axis=1).sum())
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(50, 150), deadline=None)
 @given(sets)
 def test_hypervolume_is_the_number_of_unit_cells_that_are_dominated(points):
     reference = np.full(points.shape[1], 5.0)
     assert hypervolume(points, reference) == pytest.approx(cells(points, reference), abs=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(40, 100), deadline=None)
 @given(sets)
 def test_exactly_the_points_that_another_is_better_than_are_dominated(points):
     marked = dominated(points)

@@ -21,11 +21,12 @@ WITHIN = {
 }
 
 
-#: one objective of each kind, for `direct`, which goes forward with every variable and looks at every sample with it
+#: one objective of each kind; `direct` goes forward with every variable and looks at every sample with it
 SOME = ("rotx", "wn", "dn", "mf", "En", "jfx")
 
 
-def content() -> dict:
+def content(some: tuple[str, ...] = ()) -> dict:
+    """The scene, with some of its objectives, or all."""
     scene = yaml.safe_load((CASES / "laws.yaml").read_text())
     scene["points"]["pb"]["grid"]["list"] = [[1.2, 0.6, 0.2], [1.0, 0.3, 0.4]]
     scene["points"]["pg"]["grid"]["list"] = [[1.5, -0.6, 1.2], [-1.0, 1.3, 0.4]]
@@ -36,11 +37,15 @@ def content() -> dict:
     }  # fmt: skip
     scene["solver"] = {"tolerance": 1e-11}
     scene["constraints"] = [{"volume": "all", "limit": 100}]
+    if some:
+        scene["objectives"] = {name: scene["objectives"][name] for name in some}
+        scene["combine"]["weights"] = dict.fromkeys(some, 1)
     return scene
 
 
-def test_gradients_by_points_are_slopes() -> None:
-    case = read_case(yaml.safe_dump(content(), sort_keys=False))
+@pytest.mark.parametrize("some", [SOME, ()], ids=["some", "all"])
+def test_gradients_by_points_are_slopes(some: tuple[str, ...]) -> None:
+    case = read_case(yaml.safe_dump(content(some), sort_keys=False))
     assert [each.name for each in case.variables] == ["pa.x", "pa.y", "pa.z", "pb.along", "pg.u", "pg.v"]
     found = mdstopo.evaluate(case)
     assert found.status.ok, found.message
@@ -54,10 +59,7 @@ def test_gradients_by_points_are_slopes() -> None:
 
 
 def test_direct_agrees_by_points() -> None:
-    scene = content()
-    scene["objectives"] = {name: scene["objectives"][name] for name in SOME}
-    scene["combine"]["weights"] = dict.fromkeys(SOME, 1)
-    case = read_case(yaml.safe_dump(scene, sort_keys=False))
+    case = read_case(yaml.safe_dump(content(SOME), sort_keys=False))
     found, direct = mdstopo.evaluate(case), mdstopo.evaluate(case, method="direct")
     assert found.status.ok, found.message
     for name in SOME:

@@ -13,6 +13,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.status import Status
 from tests.general.support import CASES
+from tests.tiers import examples
 from tests.variables.support import case_of, differences, whole, widths
 
 ONE = """
@@ -261,7 +262,7 @@ def scene(seed):
     return read_case("\n".join(lines) + "\n")
 
 
-@settings(max_examples=12, derandomize=True, deadline=None)
+@settings(max_examples=examples(6, 12), derandomize=True, deadline=None)
 @given(st.integers(0, 10**6))
 def test_random_legs_are_right_by_both_methods(seed):
     case = scene(seed)
