@@ -538,7 +538,12 @@ def _fill_nodes(model, candidates, i, first, node):
 
 @kernel
 def _stays(code, p, curves, rest, time, node, mode, kept):
-    """Whether a mode has not ended at any node of a step; the arguments as of `_margin`."""
+    """Whether a mode has not ended at any node of a step.
+
+    code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+    time (2,): start and length of the step (s). node (NODE_ROWS, NODES): the member there, of which X and RATE count.
+    mode, kept: the mode, and the permanent set (m).
+    """
     for m in range(1, NODES):
         if law_margin(code, p, node[X, m] - kept, node[RATE, m], mode, time[0] + NODE[m] * time[1], curves, rest) < 0.0:
             return False

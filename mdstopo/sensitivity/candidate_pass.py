@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.case.candidates import lengths_between, spread
 from mdstopo.case.model import MemberGroup
@@ -138,7 +139,9 @@ class CandidatePass(ABC, Generic[A]):
         own = self.candidates
         common = np.zeros(COMMON)
         places = spread(len(self.homes[0]), len(self.homes[1]), SAMPLE)
-        sample = self.prices_between(states, *(each.ravel() for each in np.meshgrid(*places, indexing="ij")))
+        a, b = (each.ravel() for each in np.meshgrid(*places, indexing="ij"))
+        _, there = self._lengths(a, b)
+        sample = self.prices_between(states, a[there], b[there])
         common[ERROR] = max(self.error(states) * np.abs(sample).max(initial=0.0), np.finfo(float).tiny)
         common[COST] = -1.0 if own.cost is None else own.cost
         common[BELOW] = np.nextafter(own.shortest, -np.inf) if own.shortest else 0.0
@@ -151,6 +154,12 @@ class CandidatePass(ABC, Generic[A]):
         """Which parts of the tiles may be priced by a few of their candidates (`tile_interpolation.smoothness`)."""
         rows, columns = self.chosen
         return smoothness((self.homes[0][rows], self.homes[1][columns]), self.chosen)
+
+    def _lengths(self, a: IndexArray, b: IndexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """The lengths (K,) of candidates from first points to second ones (m), and whether there are such."""
+        length = lengths_between(self.homes[0][a], self.homes[1][b])
+        own = self.candidates
+        return length, (length >= own.shortest) & (length <= own.longest) & (length > 0.0)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -190,9 +199,8 @@ class CandidatePass(ABC, Generic[A]):
         own_b = np.arange(column, min(column + BROAD, width))
         a, b = np.repeat(own_a, len(own_b)), np.tile(own_b, len(own_a))
         price = prices[(a - row) * BROAD + b - column]
-        length = lengths_between(self.homes[0][rows[a]], self.homes[1][columns[b]])
-        new = np.isfinite(price) & (length >= self.candidates.shortest)
-        new &= (length <= self.candidates.longest) & (length > 0.0)
+        length, new = self._lengths(rows[a], columns[b])
+        new &= np.isfinite(price)
         a, b, length = a[new], b[new], length[new]
         cost = length if self.candidates.cost is None else np.full(len(a), self.candidates.cost)
         gain = -self.upper * (price[new] + worth * cost)

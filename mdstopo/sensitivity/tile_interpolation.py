@@ -314,7 +314,13 @@ def _worse(one, other):
 
 @part
 def _shares(numbers, place, low, high, node, weight, share):
-    """By how much the values at nodes count in that of the polynomial at a point; share: set."""
+    """By how much the values at nodes count in that of the polynomial at a point.
+
+    numbers (n,), place: of the points of a grid, and which one it is.
+    low, high: the numbers of the part's first and last point.
+    node, weight: of `fill_weights`.
+    share: as long as these, set.
+    """
     t = (2.0 * numbers[place] - low - high) / (high - low)
     total = 0.0
     at = np.int64(-1)
