@@ -269,8 +269,9 @@ class Evaluator:
 
     def candidates_of(self, group: MemberGroup, count: int | None = None) -> "CandidatePass[Any]":
         """The candidates of a priced group, each with its mirror images; count: about so many of them, None: all."""
-        images = next(each for each in mirrored_groups(self.case) if group in each)
-        places = [self.case.members.index(each) for each in (group, *(each for each in images if each is not group))]
+        images = next(each for each in mirrored_groups(self.case) if group.name in {own.name for own in each})
+        order = {each.name: place for place, each in enumerate(self.case.members)}
+        places = [order[group.name], *(order[each.name] for each in images if each.name != group.name)]
         own = replace(self._near.members[places[0]], upper=min(each.upper for each in images))
         ends = (group.from_world, group.to_world)
         if self._near is not self.case:

@@ -60,7 +60,7 @@ def test_points_are_optima_of_all_candidates_each_with_its_own_members(tmp_path:
 
 
 def test_every_point_has_members_together_with_their_mirror_images(tmp_path: Path) -> None:
-    scene = symmetric() | LOOSE
+    scene = symmetric() | LOOSE | {"combine": {"weights": {"G": 1, "T": 1}}}
     scene["objectives"]["T"] = {"response": {"displacement": {"body": "engine", "component": "x"}}, "over_time": "rms"}
     found = run_front(case_from(scene), asked(), path=tmp_path / "a.h5", workers=1)
     assert found.status is RunStatus.CONVERGED

@@ -260,6 +260,13 @@ def symmetric(candidates: str = "priced") -> dict[str, Any]:
     return scene
 
 
+def other_lengths(scene: dict[str, Any]) -> None:
+    """Have members cost their lengths, and those on the right longer than their images."""
+    for group in scene["members"].values():
+        group["cost"] = "length"
+    scene["points"]["frame_right"]["grid"]["line"]["to"] = [1.2, 1]
+
+
 def test_mirror_images_are_priced_together(few: None) -> None:
     priced, whole = run_session(case_from(symmetric())), run_session(case_from(symmetric("enumerated")))
     assert priced.status is whole.status is RunStatus.CONVERGED, (priced.reason, whole.reason)
@@ -364,7 +371,7 @@ def test_what_does_not_go_with_prices_is_refused(changes: dict[str, Any], key: s
             lambda scene: scene["points"]["mounts_right"]["grid"]["line"].update(count=9),
             "from has 8 points in one and 9 in",
         ),
-        (lambda scene: scene["points"]["frame_right"]["grid"]["line"].update(to=[1.2, 1]), "are no mirror images"),
+        (other_lengths, "are no mirror images"),
         (
             lambda scene: scene["members"]["right"].update({"from": "frame_right", "to": "mounts_right"}),
             "from has 8 points in one and 20 in",
