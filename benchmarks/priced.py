@@ -34,10 +34,16 @@ CHECKED = 100_000
 TIMED = 40_960
 #: of laws that switch, whose steps end at every switch of every candidate that is built
 FEW_CHECKED = 300
+#: points of the arm and of the floor, for a pass over 1e8 candidates of a scene with a joint
+DENSE = (2000, 50_000)
+#: members that are built in such a scene, as at an optimum
+BUILT = 100
 #: candidates from which on a run of all of them ends after so many iterations
 MANY, SHORT = 500_000, 20
 #: the run that a process of its own makes, whose memory is its own
 PROGRAM = "from benchmarks.priced import nested; import sys; nested(int(sys.argv[1]), int(sys.argv[2]))"
+#: a pass that a process of its own makes
+PASS_PROGRAM = "from benchmarks.priced import passed; import sys; passed(int(sys.argv[1]), sys.argv[2])"
 
 
 def engine(mounts: int, frame: int, candidates: str = "priced", iterations: int = 1000) -> Case:
@@ -113,22 +119,27 @@ def whole_of(outcome: Outcome, case: Case) -> np.ndarray[Any, np.dtype[np.float6
 
 
 def priced() -> Iterator[Table]:
-    """Prices beside the gradient; optima and times beside those of all candidates; nested grids."""
+    """Prices beside the gradient; passes; optima and times beside those of all candidates; nested grids."""
     yield prices()
+    yield passes()
     yield optima()
     yield grids()
 
 
-def swing(dimension: int, law: dict[str, Any]) -> Case:
-    """An arm that hangs on a joint and is pushed, with candidates from it to the ground, in a plane or in space."""
+def swing(dimension: int, law: dict[str, Any], points: tuple[int, int] = (400, 500)) -> Case:
+    """An arm that hangs on a joint and is pushed, with candidates from it to the ground, in a plane or in space.
+
+    points: of the arm and of the floor; where these are many, steps are as long as the accuracy allows.
+    """
     up = [0.0] * (dimension - 1)
     flat = dimension == 2
     grids = {
-        "arm": {"line": {"from": [0.2, *up], "to": [1.0, *up], "count": 400}},
-        "floor": {"line": {"from": [-1.0, *up[:-1], -1.2], "to": [2.0, *up[:-1], -1.0], "count": 500}},
+        "arm": {"line": {"from": [0.2, *up], "to": [1.0, *up], "count": points[0]}},
+        "floor": {"line": {"from": [-1.0, *up[:-1], -1.2], "to": [2.0, *up[:-1], -1.0], "count": points[1]}},
     }
     if not flat:
-        grids["floor"] = {"plane": {"corner": [-1, -1, -1.2], "edges": [[3, 0, 0.1], [0, 2, 0]], "count": [25, 20]}}
+        count = [250, 200] if points == DENSE else [25, 20]
+        grids["floor"] = {"plane": {"corner": [-1, -1, -1.2], "edges": [[3, 0, 0.1], [0, 2, 0]], "count": count}}
     push = [30.0, 4.0, 9.0][:dimension]
     scene = {
         "format": 1,
@@ -148,7 +159,7 @@ def swing(dimension: int, law: dict[str, Any]) -> Case:
         "design": {"initial": 0.01, "lower": 0},
         "objectives": {"G": {"response": {"acceleration": {"body": "arm", "at": [1.0, *up]}}, "over_time": "rms"}},
         "constraints": [{"volume": "all", "limit": 20}],
-        "solver": {"integrator": "runge_kutta", "step": 0.005},
+        "solver": {} if points == DENSE else {"integrator": "runge_kutta", "step": 0.005},
     }  # fmt: skip
     return read_case(json.dumps(scene))
 
@@ -211,6 +222,54 @@ def prices() -> Table:
             "priced do not: there the difference falls with the steps.",
         ),
     )
+
+
+def passed(dimension: int, name: str) -> None:
+    """Go through all candidates of a dense scene and print what is told of it."""
+    import resource
+
+    case = swing(dimension, LAWS[name], DENSE)
+    (group,) = case.members
+    assert group.candidates is not None
+    chosen = np.sort(np.random.default_rng(1).choice(group.candidates.count, BUILT, replace=False))
+    case = with_members(case, {group.name: np.divmod(chosen, len(group.to_local))})
+    evaluator = Evaluator(case)
+    problem = evaluator.problem()
+    evaluation = problem.evaluation(case.initial)  # type: ignore[attr-defined]
+    states = problem.pricing_states(evaluation, np.ones(1))  # type: ignore[attr-defined]
+    candidates = evaluator.candidates_of(case.members[0])
+    part = evaluator.candidates_of(case.members[0], TIMED)
+    part.go_through(states, 0.0, 1)
+    began, spent = time.perf_counter(), time.process_time()
+    candidates.go_through(states, 0.0, 1)
+    told = {
+        "candidates": group.candidates.count,
+        "states": len(states.scenes[0].when),
+        "pass": time.perf_counter() - began,
+        "processor": time.process_time() - spent,
+        "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6,
+    }
+    print(json.dumps(told))
+
+
+def passes() -> Table:
+    """Passes over 1e8 candidates of scenes with a joint, each in a process of its own."""
+    rows = []
+    for dimension, where in ((2, "on a hinge"), (3, "on a ball joint, in space")):
+        for name in ("springs", "dampers", "cubic"):
+            done = subprocess.run(
+                [sys.executable, "-c", PASS_PROGRAM, str(dimension), name],
+                capture_output=True, text=True, check=True, cwd=Path(__file__).parents[1],
+            )  # fmt: skip
+            told = json.loads(done.stdout.splitlines()[-1])
+            rows.append([
+                f"{name} {where}", f"{told['candidates']:,}", str(told["states"]), f"{told['pass']:.1f} s",
+                f"{told['processor']:.1f} s", f"{1e9 * told['processor'] / told['candidates']:,.0f} ns",
+                f"{told['megabytes']:.0f} MB",
+            ])  # fmt: skip
+    columns = ["candidates", "of these", "states", "one pass", "its processor time", "of one", "memory"]
+    note = f"With {BUILT} members that are built. The states of the motion are those at which each price is a sum of."
+    return Table("Passes over all candidates of a scene with a joint", columns, rows, (note,))
 
 
 def optima() -> Table:

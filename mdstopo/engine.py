@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from mdstopo.case.candidates import mirrored_groups
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, SMOOTH, STIFF
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
@@ -269,13 +270,15 @@ class Evaluator:
         return type(parts[0]).of_all(parts)
 
     def candidates_of(self, group: MemberGroup, count: int | None = None) -> "CandidatePass[Any]":
-        """The candidates of a priced group; count: about so many of them, None: all."""
-        place = self.case.members.index(group)
-        own = self._near.members[place]
+        """The candidates of a priced group, each with its mirror images; count: about so many of them, None: all."""
+        images = next(each for each in mirrored_groups(self.case) if group.name in {own.name for own in each})
+        order = {each.name: place for place, each in enumerate(self.case.members)}
+        places = [order[group.name], *(order[each.name] for each in images if each.name != group.name)]
+        own = replace(self._near.members[places[0]], upper=min(each.upper for each in images))
         ends = (group.from_world, group.to_world)
         if self._near is not self.case:
             ends = starting_places(self._near.bodies, own)
-        return self._family.candidates(self.scenes, place, own, ends, count)
+        return self._family.candidates(self.scenes, places, own, ends, count)
 
     def otherwise(self, sample: int = 0, **solver: Any) -> "Evaluator":
         """An evaluator of the same case with other solver settings, made once for each set of them.

@@ -97,6 +97,49 @@ def with_members(case: Case, pairs: Mapping[str, Pairs]) -> Case:
     )
 
 
+def mirrored_groups(case: Case) -> list[tuple[MemberGroup, ...]]:
+    """The priced groups of a case: those whose members k have one alpha (`design.mirrored`) together, in its order."""
+    sets = {group.name: [group.name] for group in case.priced_groups}
+    for names in case.mirrored:
+        together = sorted({each for name in names if name in sets for each in sets[name]})
+        sets |= dict.fromkeys(together, together)
+    by_name = {group.name: group for group in case.priced_groups}
+    found: dict[str, tuple[MemberGroup, ...]] = {}
+    for group in case.priced_groups:
+        own = sets[group.name]
+        found.setdefault(own[0], tuple(by_name[name] for name in by_name if name in own))
+    return list(found.values())
+
+
+def unlike(first: MemberGroup, second: MemberGroup) -> str:
+    """Why two mirrored groups cannot have their candidates priced together, in words; empty where they can.
+
+    A candidate and its mirror image enter together. So both have to be there, and to cost the same.
+    """
+    if first.candidates is None or second.candidates is None:
+        return "the candidates of one are priced, and those of the other are not"
+    for side in ("from_local", "to_local"):
+        n, m = len(getattr(first, side)), len(getattr(second, side))
+        if n != m:
+            return f"{side.removesuffix('_local')} has {n:,} points in one and {m:,} in the other"
+    if (first.body_to == "ground") != (second.body_to == "ground"):
+        return "one ends on the ground and the other does not"
+    if first.candidates != second.candidates:
+        return "costs, min_length and max_length have to be the same"
+    needed = first.candidates.cost is None or first.candidates.filtered
+    if needed and not _congruent(*(np.concatenate([each.from_world, each.to_world]) for each in (first, second))):
+        return "their points are no mirror images, turned or moved: lengths differ, and with them which there are"
+    return ""
+
+
+def _congruent(first: FloatArray, second: FloatArray) -> bool:
+    """Whether points (n, d) come to others by a motion and a mirror, to rounding."""
+    own, other = first - first.mean(axis=0), second - second.mean(axis=0)
+    left, _, right = np.linalg.svd(own.T @ other)
+    off = float(np.abs(own @ (left @ right) - other).max())
+    return off <= 1e3 * ROUNDING * float(max(np.abs(first).max(), np.abs(second).max()))
+
+
 def pairs_of(case: Case) -> dict[str, Pairs]:
     """The members that priced groups have, by name."""
     return {group.name: (group.from_index, group.to_index) for group in case.priced_groups}
@@ -115,7 +158,15 @@ def with_start_set(case: Case) -> Case:
     """The case with a coarse subset of the candidates of its priced groups, enough of them for its volume rows."""
     count = START_SET
     while True:
-        begun = with_members(case, {group.name: _coarse(group, count) for group in case.priced_groups})
+        begun = with_members(
+            case,
+            {
+                each.name: own
+                for groups in mirrored_groups(case)
+                for own in [_coarse(groups[0], count)]
+                for each in groups
+            },
+        )
         lacking = [row for row in begun.constraints if isinstance(row, VolumeRow) and not _suffices(begun, row)]
         if not lacking or count >= min(MOST_STARTED, max(_count(group) for group in case.priced_groups)):
             return begun

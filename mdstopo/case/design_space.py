@@ -45,6 +45,11 @@ class DesignSpace:
         #: how many variables the optimiser has
         self.size = self._free + len(self._low)
 
+    @property
+    def slots(self) -> IndexArray:
+        """(N,): which x each alpha is."""
+        return self._slots
+
     def expand(self, x: FloatArray) -> FloatArray:
         """The design (N + P,) that x (n,) stands for; x itself where both are the same."""
         if self.identity:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.candidates import unlike
 from mdstopo.case.kinds import Number
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Follows, Law, MemberGroup, Variable
@@ -36,6 +37,12 @@ def build_shared(top: Fields, groups: dict[str, MemberGroup] | None, reading: Re
         if not _are_design(names, own, groups, reading):
             good = False
             continue
+        for name in names[1:]:
+            if any(groups[each].candidates is not None for each in (names[0], name)):
+                message = unlike(groups[names[0]], groups[name])
+                if message:
+                    reading.mistake(own, f"{shown(names[0])} and {shown(name)} cannot be priced together: {message}")
+                    good = False
         counts = [len(groups[name]) for name in names]
         if len(set(counts)) > 1:
             told = ", ".join(f"{name} has {count:,}" for name, count in zip(names, counts, strict=True))

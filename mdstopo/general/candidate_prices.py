@@ -34,6 +34,7 @@ from mdstopo.mechanics.laws.law_table import (
     SPRING,
     law,
     law_first_set,
+    law_is_idle,
     law_margin,
     law_next,
     law_remembers,
@@ -41,10 +42,21 @@ from mdstopo.mechanics.laws.law_table import (
     law_start,
 )
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-from mdstopo.sensitivity.springs_candidate_prices import BROAD, TALL, sum_tile
+from mdstopo.sensitivity.springs_candidate_prices import COMPUTED, ERROR, sum_tile
+from mdstopo.sensitivity.tile_interpolation import (
+    ASKED,
+    BROAD,
+    COLUMNS,
+    PLACES,
+    ROWS,
+    TALL,
+    ask,
+    begin_tile,
+    fill_lengths,
+    make_scratch,
+    take,
+)
 
-#: candidates of a tile, and of a call of `price_places`
-PLACES = TALL * BROAD
 #: columns of `PricedCandidates.run`
 SCENE, CODE, FIRST_STATE, FIRST_ENERGY, LAST_STATE, FIRST_STEP, LAST_STEP, FROM_START = range(8)
 #: columns of `PricedCandidates.step`, and what a step may be
@@ -73,12 +85,17 @@ ARRAYS = (
     "pose", "change", "pose_a", "energy", "when", "level", "step", "step_time", "node_pose", "node_a", "node_change",
     "node_level", "node_energy",
 )  # fmt: skip
+#: the sequence of modes that a member goes through is a number with so many digits
+MODES = 64
 #: states of one pass over a tile, whose poses stay in the nearest cache
 AT_ONCE = 32
 
 
 class PricedCandidates(NamedTuple):
-    """The candidates of a group, and the states from which their prices follow: by scenes, and by runs of states."""
+    """The candidates of a group, and the states from which their prices follow: by scenes, and by runs of states.
+
+    Where a candidate has mirror images, a scene has one entry for each of them, with points of its own.
+    """
 
     run: Annotated[
         IndexArray,
@@ -155,92 +172,142 @@ def price_places(ints, floats, candidate_ints, candidate_floats, places, out):
       out (M,): derivatives by alpha.
     """
     model = unpack_general(ints, floats.copy())
-    index = np.zeros((2, PLACES), np.int64)
-    index[:, : places.shape[1]] = places
     price = np.empty(PLACES)
-    _price(model, unpack_candidates(candidate_ints, candidate_floats), index, np.int64(0), np.empty(PLACES), price)
+    trace = np.empty(PLACES, np.int64)
+    candidates = unpack_candidates(candidate_ints, candidate_floats)
+    _price(model, candidates, places, np.int64(places.shape[1]), np.int64(0), price, trace)
     out[:] = price[: out.shape[0]]
 
 
 @entry
-def price_tiles(ints, floats, candidate_ints, candidate_floats, common, built, places, threads, out):
-    """Go through every point of the one grid with every point of another.
+def price_tiles(
+    ints,
+    floats,
+    candidate_ints,
+    candidate_floats,
+    first_numbers,
+    second_numbers,
+    smooth_rows,
+    smooth_columns,
+    common,
+    built,
+    places,
+    which,
+    threads,
+    out,
+    prices,
+):
+    """Price tiles of the members from every point of one grid to every point of another.
 
     In:
       ints, floats, candidate_ints, candidate_floats: as of `price_places`.
+      first_numbers, second_numbers, smooth_rows, smooth_columns: of `tile_interpolation.smoothness`.
       common (COMMON,): what candidates have in common, as of `sensitivity.springs_candidate_prices`.
       built (T + 1,), places (any,): by tile, where in it candidates are that do not count.
+      which (K,): the tiles.
       threads: that share the work.
     Out:
-      out (strips, tiles, TILE_NUMBERS): of each tile what is kept of it; strips tiles = T.
+      out (K, TILE_NUMBERS): of each tile what is kept of it.
+      prices (K, PLACES) or (0, PLACES): of each tile's candidates, infinite where one does not count.
     """
     counter = np.zeros(1, np.int64)
-    job = (counter, ints, floats, candidate_ints, candidate_floats, common, built, places, out)
-    shared(_price_strips, threads, job)
+    grids = (first_numbers, second_numbers, smooth_rows, smooth_columns)
+    job = (counter, ints, floats, candidate_ints, candidate_floats, grids, common, built, places, which, out, prices)
+    shared(_price_each, threads, job)
 
 
 @kernel
-def _price_strips(counter, ints, floats, candidate_ints, candidate_floats, common, built, places, out):
-    """Price strip after strip, until none is left: what each thread does.
+def _price_each(
+    counter, ints, floats, candidate_ints, candidate_floats, grids, common, built, places, which, out, prices
+):
+    """Price tile after tile, until none is left: what each thread does.
 
     In:
-      counter (1,): strips that some thread has taken so far; counted on.
-      ints, floats, candidate_ints, candidate_floats, common, built, places: as of `price_tiles`.
+      counter (1,): tiles that some thread has taken so far; counted on.
+      ints, floats, candidate_ints, candidate_floats, common, built, places, which: as of `price_tiles`.
+      grids: of `tile_interpolation.smoothness`.
     Out:
-      out (strips, tiles, TILE_NUMBERS): as of `price_tiles`.
+      out (K, TILE_NUMBERS), prices: as of `price_tiles`.
     """
     model = unpack_general(ints, floats.copy())
     candidates = unpack_candidates(candidate_ints, candidate_floats)
-    rows = candidates.first.shape[2]
-    columns = candidates.second.shape[2]
-    index = np.zeros((2, PLACES), np.int64)
+    scratch = make_scratch()
     price = np.empty(PLACES)
-    length = np.empty(PLACES)
-    i = taken(counter)
-    while i < out.shape[0]:
-        for j in range(out.shape[1]):
-            for a in range(TALL):
-                for b in range(BROAD):
-                    index[0, a * BROAD + b] = min(i * TALL + a, rows - 1)
-                    index[1, a * BROAD + b] = min(j * BROAD + b, columns - 1)
-            _price(model, candidates, index, np.int64(BROAD), length, price)
-            for a in range(TALL):
-                for b in range(BROAD):
-                    if i * TALL + a >= rows or j * BROAD + b >= columns:
-                        price[a * BROAD + b] = np.inf
-            tile = i * out.shape[1] + j
-            for at in range(built[tile], built[tile + 1]):
-                price[places[at]] = np.inf
-            sum_tile(price, length, common, out[i, j])
-        i = taken(counter)
+    length = np.zeros(PLACES)
+    across = (candidates.second.shape[2] + BROAD - 1) // BROAD
+    k = taken(counter)
+    while k < which.shape[0]:
+        tile = which[k]
+        i = tile // across
+        j = tile % across
+        price[:] = np.inf
+        computed = _price_tile(model, candidates, grids, i, j, common[ERROR], scratch, price)
+        fill_lengths(candidates.first_place, candidates.second_place, i, j, length)
+        for at in range(built[tile], built[tile + 1]):
+            price[places[at]] = np.inf
+        sum_tile(price, length, common, out[k])
+        out[k, COMPUTED] = computed
+        if prices.shape[0] > 0:
+            prices[k] = price
+        k = taken(counter)
 
 
 @kernel
-def _price(model, candidates, index, row, length, price):
-    """The prices of PLACES members.
+def _price_tile(model, candidates, grids, i, j, error, scratch, price):
+    """The prices of a tile.
+
+    In:
+      model: with room for its members, which are overwritten.
+      candidates: a `PricedCandidates`.
+      grids, error: as of `tile_interpolation.take`. i, j: the tile.
+    Out:
+      price (PLACES,): of its candidates.
+    Scratch:
+      scratch: of `tile_interpolation.make_scratch`.
+
+    Returns how many prices were computed.
+    """
+    plan, level, rows, columns, index, asked, trace, room = scratch
+    begin_tile(error, plan, level)
+    while ask(grids, i, j, plan, level, rows, columns):
+        wide = plan[COLUMNS]
+        count = plan[ROWS] * wide
+        for a in range(plan[ROWS]):
+            for b in range(wide):
+                index[0, a * wide + b] = i * TALL + rows[a]
+                index[1, a * wide + b] = j * BROAD + columns[b]
+        _price(model, candidates, index, count, wide, asked, trace)
+        take(grids, i, j, error, plan, level, rows, columns, asked, trace, room, price)
+    return plan[ASKED]
+
+
+@kernel
+def _price(model, candidates, index, count, row, price, trace):
+    """The prices of some members, PLACES at most.
 
     In:
       model: with room for them.
       candidates: a `PricedCandidates`.
-      index (2, PLACES): numbers of their points.
+      index (2, count or more): numbers of their points.
+      count: how many there are.
       row: how many behind each other begin at one point; 0: they do not.
     Out:
       model: its members are overwritten.
-      length (PLACES,): their lengths as stated (m).
       price (PLACES,): derivatives by alpha.
+      trace (PLACES,): through which modes each has gone, as a number; 0 where no law switches.
     """
     axes = candidates.first.shape[1]
     member_state = np.zeros((3, PLACES))
-    _lengths(candidates.first_place, candidates.second_place, index, length)
-    start = np.empty(PLACES)
-    stated = np.empty(PLACES)
+    start = np.empty(count)
+    stated = np.empty(count)
     price[:] = 0.0
+    trace[:] = 0
     before = np.int64(-1)
     for k in range(candidates.run.shape[0]):
         scene = candidates.run[k, SCENE]
         if scene != before:
             for d in range(axes):
-                for i in range(PLACES):
+                for i in range(count):
                     model.member[d, i] = candidates.first[scene, d, index[0, i]]
                     model.member[axes + d, i] = candidates.second[scene, d, index[1, i]]
             for i in range(candidates.curves.shape[1]):
@@ -248,17 +315,17 @@ def _price(model, candidates, index, row, length, price):
             _lengths(candidates.first_home[scene], candidates.second_home[scene], index, start)
             _lengths(candidates.first_stated[scene], candidates.second_stated[scene], index, stated)
             before = scene
-        for i in range(PLACES):
+        for i in range(count):
             free = stated[i] if candidates.rest[k] < 0.0 else candidates.rest[k]
             model.member[MEMBER_FREE_LENGTH, i] = free
             model.member[MEMBER_EXCESS, i] = (start[i] - free) * (start[i] + free)
-        _price_run(model, candidates, k, row, member_state, price)
+        _price_run(model, candidates, k, count, row, member_state, price, trace)
 
 
 @kernel
 def _lengths(first, second, index, out):
-    """out (PLACES,): distances of points first (d, n_A) from second (d, n_B), by their numbers in index (2, PLACES)."""
-    for i in range(PLACES):
+    """out (M,): distances of points first (d, n_A) from second (d, n_B), by their numbers in index (2, M or more)."""
+    for i in range(out.shape[0]):
         square = 0.0
         for d in range(first.shape[0]):
             apart = second[d, index[1, i]] - first[d, index[0, i]]
@@ -267,16 +334,17 @@ def _lengths(first, second, index, out):
 
 
 @kernel
-def _price_run(model, candidates, k, row, member_state, price):
+def _price_run(model, candidates, k, count, row, member_state, price, trace):
     """Add what members do by one law in the states of a run.
 
     In:
       model: with the members.
       candidates, k: a `PricedCandidates`, and the number of the run.
+      count: how many members there are.
       row: members behind each other that begin at one point, or 0.
       member_state (3, PLACES): zeros; no member of a law that does not switch has a mode.
     Out:
-      price (PLACES,): added to.
+      price (PLACES,), trace (PLACES,): added to.
     """
     pose = candidates.pose
     change = candidates.change
@@ -284,44 +352,45 @@ def _price_run(model, candidates, k, row, member_state, price):
     p = candidates.law[k]
     code = run[CODE]
     if run[LAST_STEP] > run[FIRST_STEP]:
-        _price_switching(model, candidates, k, price)
+        _price_switching(model, candidates, k, count, price, trace)
         return
     elastic = code == SPRING and p[1] == 0.0 and p[2] == 0.0
     begin = run[FIRST_STATE]
     if elastic:
         while begin < run[FIRST_ENERGY]:
             end = min(begin + AT_ONCE, run[FIRST_ENERGY])
-            spring_designs(
-                model, p, np.int64(0), np.int64(PLACES), row, pose[begin:end], change[begin:end], np.int64(0), price
-            )
+            spring_designs(model, p, np.int64(0), count, row, pose[begin:end], change[begin:end], np.int64(0), price)
             begin = end
     for s in range(begin, run[LAST_STATE]):
         weight = candidates.energy[s] if s >= run[FIRST_ENERGY] else 0.0
         if elastic and has_spring_energies(model):
-            spring_energies(model, p, np.int64(0), np.int64(PLACES), pose[s : s + 1], np.int64(0), weight, price)
+            spring_energies(model, p, np.int64(0), count, pose[s : s + 1], np.int64(0), weight, price)
         elif code == INERTER:
-            _add_inertial(model, p[0], pose[s, 0], change[s, 0], candidates.pose_a[s], price)
+            _add_inertial(model, count, p[0], pose[s, 0], change[s, 0], candidates.pose_a[s], price)
         else:
             member_designs(
-                model, code, p, np.int64(0), np.int64(PLACES), candidates.when[s], candidates.level[s], member_state,
+                model, code, p, np.int64(0), count, candidates.when[s], candidates.level[s], member_state,
                 member_state[MODE], pose[s, 0], change[s, 0], weight, price,
             )  # fmt: skip
 
 
 @kernel
-def _price_switching(model, candidates, k, price):
+def _price_switching(model, candidates, k, count, price, trace):
     """Add what members of a law that switches do in the steps of a run.
 
     In:
       model: with the members.
       candidates, k: a `PricedCandidates`, and the number of the run.
+      count: how many members there are.
     Out:
-      price (PLACES,): added to.
+      price (PLACES,), trace (PLACES,): added to.
     """
     node = np.empty((NODE_ROWS, NODES))
     pieces = np.empty((CHANGES + 1, PIECE))
-    for i in range(PLACES):
-        price[i] += _price_followed(model, candidates, k, i, node, pieces)
+    for i in range(count):
+        found, modes = _price_followed(model, candidates, k, i, node, pieces)
+        price[i] += found
+        trace[i] = MODES * trace[i] + modes
 
 
 @kernel
@@ -339,7 +408,7 @@ def _price_followed(model, candidates, k, i, node, pieces):
       node (NODE_ROWS, NODES): the member at the nodes of a step.
       pieces (CHANGES + 1, PIECE): pieces of a step in which it stays in a mode.
 
-    Returns its part of the derivative by alpha.
+    Returns its part of the derivative by alpha, and the modes that it goes through, as a number.
     """
     run = candidates.run[k]
     p = candidates.law[k]
@@ -350,6 +419,8 @@ def _price_followed(model, candidates, k, i, node, pieces):
     kept = 0.0
     begun = run[FROM_START] == 0  # a law that acts later begins in mode 0, unset
     total = 0.0
+    modes = np.int64(0)
+    told = -1
     pieces[0, PIECE_MODE] = 0.0
     pieces[0, PIECE_SET] = 0.0
     last = 0
@@ -371,17 +442,28 @@ def _price_followed(model, candidates, k, i, node, pieces):
             continue
         if step[MOVES] == 0 and not remembers:
             continue
-        _fill_nodes(model, candidates, i, step[FIRST_NODE], node)
+        _fill_motion(model, candidates, i, step[FIRST_NODE], node)
         if not begun or not remembers:
             t = candidates.step_time[s, 0]
-            mode = law_start(code, p, node[X, 0], node[RATE, 0], node[SECOND, 0], t, model.curves, rest)
+            second = _second_at_node(model, candidates, i, step[FIRST_NODE])
+            mode = law_start(code, p, node[X, 0], node[RATE, 0], second, t, model.curves, rest)
             kept = law_first_set(code, p, node[X, 0], mode)
             begun = np.bool_(True)
         pieces[0, BEGIN] = 0.0
         pieces[0, PIECE_MODE] = mode
         pieces[0, PIECE_SET] = kept
-        last = _follow(code, p, model.curves, rest, candidates.step_time[s], node, pieces)
+        last = 0
+        if not _stays(code, p, model.curves, rest, candidates.step_time[s], node, mode, kept):
+            _fill_nodes(model, candidates, i, step[FIRST_NODE], node)
+            last = _follow(code, p, model.curves, rest, candidates.step_time[s], node, pieces)
+        for at in range(last + 1):
+            own_mode = int(pieces[at, PIECE_MODE])
+            if step[KIND] == WHOLE and own_mode != told:
+                modes = MODES * modes + own_mode + 1
+                told = own_mode
         if last == 0:
+            if law_is_idle(code, mode):
+                continue
             for o in range(step[FIRST_STAGE], step[LAST_STAGE]):
                 worked, stored = _at_state(model, candidates, code, p, i, o, mode, kept)
                 total += worked + stored
@@ -392,7 +474,7 @@ def _price_followed(model, candidates, k, i, node, pieces):
         if step[KIND] == WHOLE:
             mode = int(pieces[last, PIECE_MODE])
             kept = pieces[last, PIECE_SET]
-    return total
+    return total, modes
 
 
 @kernel
@@ -417,23 +499,55 @@ def _at_state(model, candidates, code, p, i, o, mode, kept):
 
 
 @kernel
-def _fill_nodes(model, candidates, i, first, node):
-    """Elongation of member i, its two rates, its part of the virtual change, and the rest of `node`, at a step's nodes.
+def _fill_motion(model, candidates, i, first, node):
+    """Elongation of member i and its rate at the nodes of a step.
 
     model: with the members.
     candidates, first: a `PricedCandidates`, and the number of the first node.
-    node (NODE_ROWS, NODES): set.
+    node (NODE_ROWS, NODES): X and RATE are set.
     """
     for m in range(NODES):
-        r = candidates.node_pose[first + m]
-        length, x, rate = member_motion(model, i, r)
-        _, _, along = member_work(model, i, r, candidates.node_change[first + m])
+        _, x, rate = member_motion(model, i, candidates.node_pose[first + m])
         node[X, m] = x
         node[RATE, m] = rate
-        node[SECOND, m] = second_rate(model, i, r, candidates.node_a[first + m]) if length > 0.0 else 0.0
+
+
+@kernel
+def _second_at_node(model, candidates, i, at):
+    """The second derivative of the elongation of member i at the node `at`; 0 where it has no length."""
+    r = candidates.node_pose[at]
+    length, _, _ = member_motion(model, i, r)
+    return second_rate(model, i, r, candidates.node_a[at]) if length > 0.0 else 0.0
+
+
+@kernel
+def _fill_nodes(model, candidates, i, first, node):
+    """What else `node` has of member i at the nodes of a step, whose X and RATE are known.
+
+    model: with the members.
+    candidates, first: a `PricedCandidates`, and the number of the first node.
+    node (NODE_ROWS, NODES): SECOND, ALONG, LEVEL and WEIGHT are set.
+    """
+    for m in range(NODES):
+        _, _, along = member_work(model, i, candidates.node_pose[first + m], candidates.node_change[first + m])
+        node[SECOND, m] = _second_at_node(model, candidates, i, first + m)
         node[ALONG, m] = along
         node[LEVEL, m] = candidates.node_level[first + m]
         node[WEIGHT, m] = candidates.node_energy[first + m]
+
+
+@kernel
+def _stays(code, p, curves, rest, time, node, mode, kept):
+    """Whether a mode has not ended at any node of a step.
+
+    code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+    time (2,): start and length of the step (s). node (NODE_ROWS, NODES): the member there, of which X and RATE count.
+    mode, kept: the mode, and the permanent set (m).
+    """
+    for m in range(1, NODES):
+        if law_margin(code, p, node[X, m] - kept, node[RATE, m], mode, time[0] + NODE[m] * time[1], curves, rest) < 0.0:
+            return False
+    return True
 
 
 @kernel
@@ -539,17 +653,18 @@ def _over_piece(model, candidates, code, p, rest, s, node, piece, end):
 
 
 @kernel
-def _add_inertial(model, inertance, r, u, acc, price):
+def _add_inertial(model, count, inertance, r, u, acc, price):
     """Add what inerters do at one state.
 
     In:
       model: with the members.
+      count: how many there are.
       inertance: at alpha = 1 (kg).
       r (POSE,), u (D,), acc (D,): the relative pose, minus its virtual change, and its second derivative.
     Out:
       price (PLACES,): added to.
     """
-    for i in range(PLACES):
+    for i in range(count):
         length, _, along = member_work(model, i, r, u)
         if length > 0.0:
             price[i] += inertance * second_rate(model, i, r, acc) * along

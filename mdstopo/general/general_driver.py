@@ -835,13 +835,17 @@ def _scenes(case: Case) -> Mapping[str, GeneralScene]:
 
 
 def _candidates(
-    scenes: Mapping[str, Any], place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None
+    scenes: Mapping[str, GeneralScene],
+    places: Sequence[int],
+    group: MemberGroup,
+    homes: tuple[FloatArray, FloatArray],
+    count: int | None,
 ) -> "GeneralCandidates":
-    """The candidates of a priced group; the scenes tell nothing that their cases do not."""
+    """The candidates of a priced group and its mirror images; the scenes tell nothing that their cases do not."""
     from mdstopo.general.general_pricing import GeneralCandidates
 
     del scenes
-    return GeneralCandidates(place, group, homes, count)
+    return GeneralCandidates(places, group, homes, count)
 
 
 GENERAL = SceneFamily(_scenes, GeneralDriver, _candidates)

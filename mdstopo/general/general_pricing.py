@@ -9,7 +9,7 @@ from mdstopo.case.laws import Law
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.compiler.threads import allowed
 from mdstopo.general import candidate_prices as kernels
-from mdstopo.general.candidate_prices import FIELDS, NODE, NODES, PLACES
+from mdstopo.general.candidate_prices import FIELDS, NODE, NODES
 from mdstopo.general.compile_general import GeneralScene
 from mdstopo.general.dimension import dimension_of, in_frame
 from mdstopo.general.extremes import COLUMNS, FRACTION, RATE, STEP
@@ -22,14 +22,17 @@ from mdstopo.mechanics.laws.law_table import SPRING, kernels_of, may_switch
 from mdstopo.scene.bodies import stands_as
 from mdstopo.scene.origin import starting_places
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-from mdstopo.sensitivity.candidate_pass import CandidatePass
-from mdstopo.sensitivity.springs_candidate_prices import TILE_NUMBERS
+from mdstopo.sensitivity.candidate_pass import SMOOTH_ERROR, CandidatePass
+from mdstopo.sensitivity.tile_interpolation import PLACES
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
 
 #: the highest power of time that virtual changes within a step have, and stages from which on they have it
 HIGHEST, MANY = 3, 8
+#: the largest error of a price in a pass where laws switch, relative to the largest price: prices of these are
+#: accurate to the steps alone
+SWITCHING_ERROR = 1e-9
 
 
 class ScenePricingStates(NamedTuple):
@@ -128,22 +131,29 @@ def _rows_of(driver: "GeneralDriver", factor: FloatArray) -> _Rows:
 
 
 class GeneralCandidates(CandidatePass[PricingStates]):
-    """The candidates of a group of any laws; place: its number in the case. The rest as of `CandidatePass`."""
+    """The candidates of a group of any laws, each with its mirror images: their price is what all change together.
+
+    places: the numbers of the group and of its mirror images in the case. The rest as of `CandidatePass`.
+    """
 
     def __init__(
-        self, place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None = None
+        self,
+        places: Sequence[int],
+        group: MemberGroup,
+        homes: tuple[FloatArray, FloatArray],
+        count: int | None = None,
     ) -> None:
         # as `scene.origin.ends_of` has it
         super().__init__(group, homes, group.body_to == GROUND, count)
-        self._place = place
+        self._places = tuple(places)
         self._last: tuple[PricingStates, tuple[IndexArray, FloatArray]] | None = None
 
-    def tiles(self, states: PricingStates, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
-        """(T, TILE_NUMBERS): what `price_tiles` keeps of each tile."""
-        out = np.empty((*self.shape, TILE_NUMBERS))
-        packed = self._packed(states, self.chosen)
-        kernels.price_tiles(*self._room(states), *packed, self.common(worth), *built, allowed(), out)
-        return out.reshape(-1, TILE_NUMBERS)
+    def fill_tiles(
+        self, states: PricingStates, common: FloatArray, which: IndexArray, out: FloatArray, prices: FloatArray
+    ) -> None:
+        """See `CandidatePass.fill_tiles`."""
+        packed = (*self._room(states), *self._packed(states, self.chosen))
+        kernels.price_tiles(*packed, *self.smoothness, common, *self.by_tile, which, allowed(), out, prices)
 
     def prices_between(self, states: PricingStates, a: IndexArray, b: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from first points to second ones."""
@@ -157,6 +167,11 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             kernels.price_places(*room, *self._last[1], places, out)
             found[part] = out
         return found
+
+    def error(self, states: PricingStates) -> float:
+        """The largest error of a price in a pass, relative to the largest price."""
+        switches = any(scene.steps is not None for scene in states.scenes)
+        return SWITCHING_ERROR if switches else SMOOTH_ERROR
 
     def _room(self, states: PricingStates) -> tuple[IndexArray, FloatArray]:
         """A packed scene with room for the members of a tile, and for the numbers of any of the scenes' laws."""
@@ -177,15 +192,16 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         self, states: PricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]
     ) -> tuple[IndexArray, FloatArray]:
         """A packed `candidate_prices.PricedCandidates`; chosen: which points of both grids."""
-        curves = np.zeros((len(states.scenes), _most_curves(states)))
+        parts = [(scene, place) for scene in states.scenes for place in self._places]
+        curves = np.zeros((len(parts), _most_curves(states)))
         points: list[list[FloatArray]] = []
         runs: list[_Run] = []
         rows: list[list[int]] = []
         state = step = node = 0
-        for number, scene in enumerate(states.scenes):
+        for number, (scene, place) in enumerate(parts):
             curves[number, : len(scene.model.curves)] = scene.model.curves
-            points.append(self._points(scene, chosen))
-            for run in self._runs(scene):
+            points.append(self._points(scene, place, chosen))
+            for run in _runs(scene, place):
                 code, before, from_start = run.row
                 ends = state + len(run.when), step + len(run.step)
                 rows.append([number, code, state, state + before, ends[0], step, ends[1], from_start])
@@ -205,11 +221,14 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         return FIELDS.packed(kernels.PricedCandidates(*arrays))
 
     def _points(
-        self, scene: ScenePricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]
+        self, scene: ScenePricingStates, place: int, chosen: tuple[IndexArray | slice, IndexArray | slice]
     ) -> list[FloatArray]:
-        """Points of both grids (d, n) as a scene has them: in body frames, at the start, where its case has them."""
+        """Points of both grids (d, n) as a scene has them: in body frames, at the start, where its case has them.
+
+        place: the number of the group or of a mirror image of it.
+        """
         case, load_case = scene.case, scene.scene.load_case
-        group, dimension = case.members[self._place], dimension_of(case)
+        group, dimension = case.members[place], dimension_of(case)
         names = (group.body_from, group.body_to)[self.order]
         local = [
             in_frame(dimension.frames(load_case), name, points)
@@ -225,12 +244,6 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             ]
         pairs = (local, home, stated)
         return [each[side][chosen[side]].T for each in pairs for side in range(2)]
-
-    def _runs(self, scene: ScenePricingStates) -> "list[_Run]":
-        """The states of each law of the group in a scene."""
-        model, group = scene.model, as_computed(scene.case).members[self._place]
-        blocks = np.flatnonzero(model.block[:, GROUP] == self._place)
-        return [_run_of(scene, k, record) for k, record in zip(blocks.tolist(), group.laws, strict=True)]
 
 
 class _Run(NamedTuple):
@@ -256,6 +269,13 @@ class _Run(NamedTuple):
     node_change: FloatArray
     node_level: FloatArray
     node_energy: FloatArray
+
+
+def _runs(scene: ScenePricingStates, place: int) -> list[_Run]:
+    """The states of each law of a group in a scene; place: the group's number."""
+    model, group = scene.model, as_computed(scene.case).members[place]
+    blocks = np.flatnonzero(model.block[:, GROUP] == place)
+    return [_run_of(scene, k, record) for k, record in zip(blocks.tolist(), group.laws, strict=True)]
 
 
 def _run_of(scene: ScenePricingStates, k: int, record: Law) -> _Run:

@@ -25,9 +25,10 @@ class _Part(NamedTuple):
     alpha: Floats
 
 
-def packed(case: Case, alpha: Floats) -> Floats:
-    """A design (N,) of the members that the case has built, as one array; of priced groups those with alpha > 0."""
+def packed(case: Case, x: Floats) -> Floats:
+    """A design as one array, from the optimiser's x (n,); of priced groups it has the members with alpha > 0."""
     pieces: list[Floats] = []
+    alpha = case.space.expand(x)
     for group in case.design_groups:
         own = alpha[case.group_slices[group.name]]
         if group.candidates is not None:
@@ -41,7 +42,7 @@ def packed(case: Case, alpha: Floats) -> Floats:
 
 
 def unpacked(case: Case, design: Floats) -> tuple[Case, Floats]:
-    """The case with a design's members and those it has itself, and alpha (N,), 0 of the latter."""
+    """The case with a design's members and those it has itself, and x (n,), 0 of the latter."""
     pairs = {part.group.name: part.pairs for part in _parts(case, design) if part.pairs is not None}
     built = with_members(case, {name: _united([own, _ends(case, name)]) for name, own in pairs.items()})
     return built, in_case(built, design)
@@ -58,7 +59,7 @@ def with_all(case: Case, designs: Iterable[Floats]) -> Case:
 
 
 def in_case(built: Case, design: Floats) -> Floats:
-    """(N,) the alpha of a design in a case that has all of the design's members, and perhaps more."""
+    """(n,) the x of a design in a case that has all of the design's members, and perhaps more."""
     alpha = np.zeros(built.n_design)
     for part in _parts(built, design):
         own = alpha[built.group_slices[part.group.name]]
@@ -68,7 +69,7 @@ def in_case(built: Case, design: Floats) -> Floats:
             width = len(part.group.to_local)
             known = part.group.from_index * width + part.group.to_index
             own[np.searchsorted(known, part.pairs[0] * width + part.pairs[1])] = part.alpha
-    return alpha
+    return built.space.reduce(alpha)
 
 
 def _ends(case: Case, name: str) -> Pairs:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.candidates import Pairs, with_members
+from mdstopo.case.candidates import Pairs, mirrored_groups, with_members
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.bundle import Bundle
@@ -39,9 +39,9 @@ class Prices:
 
     seen: candidates. best: the largest gain of one, together: how much all of them may gain, relative to the
     objective, to first order. pairs: those that are to enter, by group; gains: of these, the largest first; left: the
-    largest gain of any other one, -inf where there is none. built (N,): dL/dalpha of the members that are built, with
-    the multipliers of rows and limits. residual: of the optimality conditions of these members. rows (R + C,), linear
-    (m,): these multipliers; gradients (R + C, N): of the rows.
+    largest gain of any other one, -inf where there is none. built (n,): dL/dx of the members that are built, with the
+    multipliers of rows and limits. residual: of the optimality conditions of these members. rows (R + C,), linear (m,):
+    these multipliers; gradients (R + C, n): of the rows.
     """
 
     seen: int
@@ -93,14 +93,16 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
     pairs: dict[str, Pairs] = {}
     gains: dict[str, Floats] = {}
     left: dict[str, float] = {}
-    for group in case.priced_groups:
-        found = evaluator.candidates_of(group, count).go_through(states, _worth(case, group, linear), MOST)
-        seen += found.seen + (len(group) if count is None else 0)
+    for groups in mirrored_groups(case):
+        worth = sum(_worth(case, group, linear) for group in groups)
+        found = evaluator.candidates_of(groups[0], count).go_through(states, worth, MOST)
+        seen += len(groups) * found.seen + (sum(map(len, groups)) if count is None else 0)
         best = max(best, found.best / scale)
-        material = _material(case, group)
+        material = _material(case, groups)
         together += (found.together if material is None else min(found.together, found.ratio * material)) / scale
-        pairs[group.name], gains[group.name] = (found.i, found.j), found.gain / scale
-        left[group.name] = found.left / scale
+        for group in groups:
+            pairs[group.name], gains[group.name] = (found.i, found.j), found.gain / scale
+            left[group.name] = found.left / scale
     return Prices(seen, best, together, pairs, gains, left, built, residual, rows, linear, gradients)
 
 
@@ -127,11 +129,13 @@ def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
     slopes = slopes_with(prices, gradients_of(sample), _places(case, larger)) + prices.linear @ other.linear.A
     scale = abs(sample.objective) or 1.0
     best = 0.0
-    for group in larger.priced_groups:
+    for groups in mirrored_groups(larger):
+        group = groups[0]
         i, j = chosen[group.name]
         known = group.from_index * len(group.to_local) + group.to_index
-        own = slopes[larger.group_slices[group.name]][np.searchsorted(known, i * len(group.to_local) + j)]
-        exact, told = -group.upper * own / scale, prices.gains[group.name]
+        of_group = slopes[larger.space.slots[larger.group_slices[group.name]]]
+        slope = of_group[np.searchsorted(known, i * len(group.to_local) + j)]
+        exact, told = -min(each.upper for each in groups) * slope / scale, prices.gains[group.name]
         best = max(best, float(exact.max(initial=0.0)))
         others = max(float(told[len(exact) :].max(initial=-np.inf)), prices.left[group.name])
         best = max(best, others + float(np.abs(exact - told[: len(exact)]).max(initial=0.0)))
@@ -147,8 +151,8 @@ def gradients_of(sample: Sample) -> Floats:
 def slopes_with(prices: Prices, gradients: Floats, places: Ints) -> Floats:
     """The weighted sum (M,) of rows of a case with more members, (K, M), with the multipliers of prices.
 
-    Each row that carries one is taken for the row with the most similar gradient by the members that both have; places
-    (N,): of these among the M. Rows that are as high as each other may change places.
+    Each row that carries one is taken for the row with the most similar gradient by the variables that both have;
+    places (N,): of these among the M. Rows that are as high as each other may change places.
     """
     total = np.zeros(gradients.shape[1])
     for weight, row in zip(prices.rows.tolist(), prices.gradients, strict=True):
@@ -159,7 +163,7 @@ def slopes_with(prices: Prices, gradients: Floats, places: Ints) -> Floats:
 
 
 def _places(case: Case, larger: Case) -> Ints:
-    """(N,): where the members of a case are among those of one that has them and more."""
+    """(n,): where the optimiser's variables of a case are among those of one that has its members and more."""
     pieces = []
     for group in case.design_groups:
         part, width = larger.group_slices[group.name], len(group.to_local)
@@ -169,7 +173,9 @@ def _places(case: Case, larger: Case) -> Ints:
             known = every.from_index * width + every.to_index
             own = np.searchsorted(known, group.from_index * width + group.to_index)
         pieces.append(part.start + own)
-    return np.concatenate(pieces)
+    found = np.empty(case.space.size, dtype=np.intp)
+    found[case.space.slots] = larger.space.slots[np.concatenate(pieces)]
+    return found
 
 
 def _multipliers(problem: "DesignProblem", sample: Sample, x: Floats) -> tuple[float, Floats, Floats]:
@@ -194,9 +200,11 @@ def _worth(case: Case, group: MemberGroup, linear: Floats) -> float:
     return float(np.array(signs) @ (linear * np.array(covers)))
 
 
-def _material(case: Case, group: MemberGroup) -> float | None:
-    """How much members of the group may cost together; None where nothing limits that, or they cost nothing."""
+def _material(case: Case, groups: tuple[MemberGroup, ...]) -> float | None:
+    """How much members of a group, each with its mirror images in others, may cost there; None where nothing limits
+    that, or they cost nothing."""
     rows = [row for row in case.constraints if isinstance(row, VolumeRow) and row.sense != "at_least"]
-    if group.candidates is None or group.candidates.cost == 0.0:
+    if any(group.candidates is None or group.candidates.cost == 0.0 for group in groups):
         return None
-    return min((row.bound for row in rows if group.name in row.groups), default=None)
+    covered = [(row.bound, sum(group.name in row.groups for group in groups)) for row in rows]
+    return min((bound / count for bound, count in covered if count), default=None)

@@ -47,8 +47,8 @@ def members_part(case: Case) -> Datasets:
 
 
 class Rounds:
-    """The rounds of pricing of a case. case: with the members that are built; design (N,): where the next round
-    begins."""
+    """The rounds of pricing of a case. case: with the members that are built; design (n,): where the next round
+    begins, as the optimiser's x."""
 
     def __init__(self, case: Case) -> None:
         self.case = case
@@ -112,7 +112,7 @@ class Rounds:
             row = (*row[:1], 0, 0, *row[3:])
         self.rows.append(tuple(float(each) for each in row))
         if not self._ended:
-            self._build(pairs, staying, state.best_alpha)
+            self._build(pairs, staying, self.case.space.expand(state.best_alpha))
         return not self._ended
 
     @property
@@ -146,17 +146,18 @@ class Rounds:
     def _entered(self, found: Prices, state: State, may_leave: bool) -> tuple[dict[str, Pairs], NDArray[np.bool_]]:
         """The candidates that enter, and which members (N,) stay."""
         case = self.case
+        alpha = case.space.expand(state.best_alpha)
         staying = np.ones(case.n_design, dtype=np.bool_)
         if may_leave:
             for group in case.priced_groups:
                 part = case.group_slices[group.name]
-                gone = (state.best_alpha[part] <= group.lower) & (found.built[part] >= 0.0)
+                gone = (alpha[part] <= group.lower) & (found.built[case.space.slots[part]] >= 0.0)
                 gone[:1] &= not gone.all()
                 staying[part] = ~gone
         return found.pairs, staying
 
     def _build(self, entering: dict[str, Pairs], staying: NDArray[np.bool_], alpha: Floats) -> None:
-        """Make the case of the next round, and the design with which it begins."""
+        """Make the case of the next round, and the design with which it begins; alpha (N,): of the last one."""
         slices, pairs, pieces = self.case.group_slices, {}, []
         for group in self.case.design_groups:
             part = slices[group.name]
@@ -170,7 +171,8 @@ class Rounds:
             order = np.lexsort((j, i))
             pairs[group.name] = (i[order], j[order])
             pieces.append(own[order])
-        self.case, self.design = with_members(self.case, pairs), np.concatenate(pieces)
+        self.case = with_members(self.case, pairs)
+        self.design = self.case.space.reduce(np.concatenate(pieces))
 
     def part(self) -> Datasets:
         """The datasets that a file keeps: the points of the members that are built, and the rounds."""

@@ -1,5 +1,6 @@
 """Which family of kernels a case needs: that of springs between free bodies, or the general one."""
 
+from mdstopo.case.candidates import mirrored_groups
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
 from mdstopo.case.over_time import REDUCTIONS
@@ -28,6 +29,8 @@ def beyond_springs(case: Case) -> str:
         return "loads that are formulas of time"
     if case.priced_groups and case.uncertainty is not None:
         return "priced candidates of an uncertain case"
+    if any(len(groups) > 1 for groups in mirrored_groups(case)):
+        return "priced candidates of mirrored groups"
     if case.variables:
         if all(each.points for each in case.variables):
             return "movable points"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from mdstopo.case.candidates import mirrored_groups
 from mdstopo.case.errors import Mistake
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, Objective, Response, ResponseRow, VolumeRow
@@ -115,9 +116,11 @@ def _unpriced(case: Case, group: MemberGroup) -> Iterator[tuple[str, str]]:
             "no candidate of a coarse subset of the points, with which a run begins, is within the stated lengths",
         )
     where = f"members.{name}.candidates"
-    for key in ("shared", "mirrored", "variables"):
-        if getattr(case, key):
-            yield where, f"priced does not go with design.{key}"
+    tied = {each.name for groups in mirrored_groups(case) if group in groups for each in groups}
+    if tied & set(case.shared):
+        yield where, "priced does not go with design.shared of the group: all candidates would have one alpha"
+    if case.variables:
+        yield where, "priced does not go with design.variables"
     if case.solver.settle:
         yield where, "priced does not go with static settling: a little of any candidate moves the start"
     if not chosen(case.solver.sensitivity).of_candidates:

@@ -6,9 +6,11 @@ single candidates (`sensitivity.springs_pricing`, `general.general_pricing`).
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.case.candidates import lengths_between, spread
 from mdstopo.case.model import MemberGroup
@@ -17,19 +19,22 @@ from mdstopo.sensitivity.springs_candidate_prices import (
     ABOVE,
     BELOW,
     BEST,
-    BROAD,
     COMMON,
     COST,
+    ERROR,
     RATIO,
     SEEN,
-    TALL,
+    TILE_NUMBERS,
     TOGETHER,
     UPPER,
     WORTH,
 )
+from mdstopo.sensitivity.tile_interpolation import BROAD, PLACES, TALL, smoothness
 
 #: tiles of which all candidates are priced one by one, of those with the largest gains
 TILES = 64
+#: the largest error of a price in a pass, relative to the largest price, and of how many candidates that is found
+SMOOTH_ERROR, SAMPLE = 1e-12, 512
 #: of a tile, how many are told before any is of which so many are told already
 SHARE = 8
 
@@ -76,12 +81,21 @@ class CandidatePass(ABC, Generic[A]):
         self.chosen = spread(len(self.homes[0]), len(self.homes[1]), count)
 
     @abstractmethod
-    def tiles(self, states: A, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
-        """(T, TILE_NUMBERS): what the pass keeps of each tile; worth: of a unit of cost; built: of `_by_tile`."""
+    def fill_tiles(self, states: A, common: FloatArray, which: IndexArray, out: FloatArray, prices: FloatArray) -> None:
+        """Price tiles.
+
+        common: of `common`. which (K,): the tiles.
+        Out: out (K, TILE_NUMBERS), what is kept of each; prices (K, PLACES), or (0, PLACES) where they are not wanted:
+        of its candidates, infinite where one does not count.
+        """
 
     @abstractmethod
     def prices_between(self, states: A, a: IndexArray, b: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from first points to second ones."""
+
+    def error(self, states: A) -> float:
+        """The largest error of a price in a pass, relative to the largest price."""
+        return SMOOTH_ERROR
 
     def prices(self, states: A, i: IndexArray, j: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from points P (K,) to points Q (K,)."""
@@ -92,15 +106,19 @@ class CandidatePass(ABC, Generic[A]):
 
         worth: of a unit of cost, the multipliers of volume rows.
         """
-        tiles = self.tiles(states, worth, self._by_tile())
+        common = self.common(states, worth)
+        tiles, _ = self.tiles(states, common, np.arange(self.shape[0] * self.shape[1]))
         best = tiles[:, BEST]
         by_gain = np.argsort(-best, kind="stable")
         chosen = by_gain[:TILES]
-        a, b, rank, gain = (np.concatenate(each) for each in zip(
-            *(self._of_tile(states, int(tile), worth) for tile in chosen), strict=True
+        _, prices = self.tiles(states, common, chosen, True)
+        a, b, rank, gain, cost = (np.concatenate(each) for each in zip(
+            *(self._of_tile(int(tile), own, worth) for tile, own in zip(chosen, prices, strict=True)), strict=True
         ))  # fmt: skip
         # of every tile some before more of any: neighbours are alike
         order = np.lexsort((-gain, rank // SHARE))[:most]
+        rows, columns = self.chosen[0][a[order]], self.chosen[1][b[order]]
+        gain[order] = -self.upper * (self.prices_between(states, rows, columns) + worth * cost[order])
         order = order[np.argsort(-gain[order], kind="stable")]
         left = np.append(np.delete(gain, order), best[by_gain[TILES:]]).max(initial=-np.inf)
         i, j = (self.chosen[0][a[order]], self.chosen[1][b[order]])[self.order]
@@ -108,15 +126,40 @@ class CandidatePass(ABC, Generic[A]):
         largest, ratio = max(float(best.max()), 0.0), float(tiles[:, RATIO].max())
         return Passed(seen, largest, together, ratio, i, j, gain[order], float(left))
 
-    def common(self, worth: float) -> FloatArray:
+    def tiles(
+        self, states: A, common: FloatArray, which: IndexArray, wanted: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """(K, TILE_NUMBERS) and (K, PLACES), or (0, PLACES) where these are not wanted, of `fill_tiles`."""
+        out, prices = np.empty((len(which), TILE_NUMBERS)), np.empty((len(which) if wanted else 0, PLACES))
+        self.fill_tiles(states, common, which.astype(np.int64), out, prices)
+        return out, prices
+
+    def common(self, states: A, worth: float) -> FloatArray:
         """(COMMON,) of what candidates have in common, without what belongs to a law; worth: of a unit of cost."""
         own = self.candidates
         common = np.zeros(COMMON)
+        places = spread(len(self.homes[0]), len(self.homes[1]), SAMPLE)
+        a, b = (each.ravel() for each in np.meshgrid(*places, indexing="ij"))
+        _, there = self._lengths(a, b)
+        sample = self.prices_between(states, a[there], b[there])
+        common[ERROR] = max(self.error(states) * np.abs(sample).max(initial=0.0), np.finfo(float).tiny)
         common[COST] = -1.0 if own.cost is None else own.cost
         common[BELOW] = np.nextafter(own.shortest, -np.inf) if own.shortest else 0.0
         common[ABOVE] = np.nextafter(own.longest, np.inf)
         common[WORTH], common[UPPER] = worth, self.upper
         return common
+
+    @cached_property
+    def smoothness(self) -> tuple[FloatArray, FloatArray, IndexArray, IndexArray]:
+        """Which parts of the tiles may be priced by a few of their candidates (`tile_interpolation.smoothness`)."""
+        rows, columns = self.chosen
+        return smoothness((self.homes[0][rows], self.homes[1][columns]), self.chosen)
+
+    def _lengths(self, a: IndexArray, b: IndexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """The lengths (K,) of candidates from first points to second ones (m), and whether there are such."""
+        length = lengths_between(self.homes[0][a], self.homes[1][b])
+        own = self.candidates
+        return length, (length >= own.shortest) & (length <= own.longest) & (length > 0.0)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -124,7 +167,8 @@ class CandidatePass(ABC, Generic[A]):
         rows, columns = self.chosen
         return -(-len(rows) // TALL), -(-len(columns) // BROAD)
 
-    def _by_tile(self) -> tuple[IndexArray, IndexArray]:
+    @cached_property
+    def by_tile(self) -> tuple[IndexArray, IndexArray]:
         """(T + 1,) and (any,): by tile, where in it the members are that are built."""
         a, b = self._built_here()
         tile = a // TALL * self.shape[1] + b // BROAD
@@ -140,22 +184,26 @@ class CandidatePass(ABC, Generic[A]):
             inside &= chosen[np.minimum(place, len(chosen) - 1)] == index
         return found[0][inside], found[1][inside]
 
-    def _of_tile(self, states: A, tile: int, worth: float) -> tuple[IndexArray, IndexArray, IndexArray, FloatArray]:
-        """Of all candidates of a tile that may enter: the places of their points among those of the tile, their
-        ranks in the tile, and their gains."""
+    def _of_tile(
+        self, tile: int, prices: FloatArray, worth: float
+    ) -> tuple[IndexArray, IndexArray, IndexArray, FloatArray, FloatArray]:
+        """Of all candidates of a tile that may enter: the places of their points among those that are priced, their
+        ranks in the tile, their gains and what they cost.
+
+        prices (PLACES,): of the tile; worth: of a unit of cost.
+        """
         rows, columns = self.chosen
         width = len(columns)
         row, column = tile // self.shape[1] * TALL, tile % self.shape[1] * BROAD
         own_a = np.arange(row, min(row + TALL, len(rows)))
         own_b = np.arange(column, min(column + BROAD, width))
         a, b = np.repeat(own_a, len(own_b)), np.tile(own_b, len(own_a))
-        there = self._built_here()
-        new = ~np.isin(a * width + b, there[0] * width + there[1])
-        length = lengths_between(self.homes[0][rows[a]], self.homes[1][columns[b]])
-        new &= (length >= self.candidates.shortest) & (length <= self.candidates.longest) & (length > 0.0)
+        price = prices[(a - row) * BROAD + b - column]
+        length, new = self._lengths(rows[a], columns[b])
+        new &= np.isfinite(price)
         a, b, length = a[new], b[new], length[new]
-        cost = length if self.candidates.cost is None else self.candidates.cost
-        gain = -self.upper * (self.prices_between(states, rows[a], columns[b]) + worth * cost)
+        cost = length if self.candidates.cost is None else np.full(len(a), self.candidates.cost)
+        gain = -self.upper * (price[new] + worth * cost)
         rank = np.empty(len(gain), dtype=np.intp)
         rank[np.argsort(-gain, kind="stable")] = np.arange(len(gain))
-        return a, b, rank, gain
+        return a, b, rank, gain, cost

@@ -38,16 +38,27 @@ from mdstopo.scene.springs_model import (
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
 from mdstopo.sensitivity.springs_adjoint import reverse_sweep
 from mdstopo.sensitivity.state_in_step import state_in_step
+from mdstopo.sensitivity.tile_interpolation import (
+    ASKED,
+    BROAD,
+    COLUMNS,
+    PLACES,
+    ROWS,
+    TALL,
+    ask,
+    begin_tile,
+    fill_lengths,
+    make_scratch,
+    take,
+)
 
-#: rows and columns of a tile
-TALL, BROAD = 16, 128
 #: what is kept of a tile: how many candidates it has, the largest gain of one, below zero where none gains, the sum of
-#: all that gain, and the largest gain for what it costs
-SEEN, BEST, TOGETHER, RATIO = range(4)
-TILE_NUMBERS = 4
+#: all that gain, and the largest gain for what it costs; how many prices were computed, of which the others followed
+SEEN, BEST, TOGETHER, RATIO, COMPUTED = range(5)
+TILE_NUMBERS = 5
 #: what candidates have in common: stiffness, damping, preload; the free length, negative where it is the initial one;
 #: the cost, negative where it is that length; which lengths are allowed, just below the shortest and just above the
-#: longest; what a unit of cost is worth; the largest alpha
+#: longest; what a unit of cost is worth; the largest alpha; by how much a price may be off
 (
     K,
     C,
@@ -58,8 +69,9 @@ TILE_NUMBERS = 4
     ABOVE,
     WORTH,
     UPPER,
-) = range(9)
-COMMON = 9
+    ERROR,
+) = range(10)
+COMMON = 10
 #: prices are below it
 FAR = 1e300
 #: `row_poses` needs more room
@@ -230,99 +242,164 @@ def block_of(kind, places, width):
 
 @entry
 def price_candidates(
-    first, second, first_home, second_home, common, kind, pose, change, weight, built, places, threads, out
+    first,
+    second,
+    first_home,
+    second_home,
+    first_numbers,
+    second_numbers,
+    smooth_rows,
+    smooth_columns,
+    common,
+    kind,
+    pose,
+    change,
+    weight,
+    built,
+    places,
+    which,
+    threads,
+    out,
+    prices,
 ):
-    """Go through every point of the one grid with every point of another.
+    """Price tiles of the members from every point of one grid to every point of another.
 
     In:
-      first (2, n_A), second (2, n_B): points in the frames of their bodies (m), of padded length.
+      first (2, n_A), second (2, n_B): points in the frames of their bodies (m).
       first_home, second_home (2, n_A), (2, n_B): where they are at the start (m).
+      first_numbers, second_numbers, smooth_rows, smooth_columns: of `tile_interpolation.smoothness`.
       common (COMMON,): what candidates have in common.
       kind: of their law, as of `Model.block`.
       pose, change, weight: as of `price_members`.
-      built (T + 1,), places (any,): by tile, where in it candidates are that do not count: members, and padding.
+      built (T + 1,), places (any,): by tile, where in it candidates are that do not count.
+      which (K,): the tiles.
       threads: that share the work.
     Out:
-      out (strips, tiles, TILE_NUMBERS): of each tile what is kept of it; strips tiles = T.
+      out (K, TILE_NUMBERS): of each tile what is kept of it.
+      prices (K, PLACES) or (0, PLACES): of each tile's candidates, infinite where one does not count.
     """
     counter = np.zeros(1, np.int64)
-    job = (
-        counter, first, second, first_home, second_home, common, kind, pose, change, weight, built, places, out
-    )  # fmt: skip
-    shared(_price_strips, threads, job)
+    points = (first, second, first_home, second_home)
+    grids = (first_numbers, second_numbers, smooth_rows, smooth_columns)
+    job = (counter, points, grids, common, kind, pose, change, weight, built, places, which, out, prices)
+    shared(_price_each, threads, job)
 
 
 @kernel
-def _price_strips(
-    counter, first, second, first_home, second_home, common, kind, pose, change, weight, built, places, out
-):
-    """Price strip after strip, until none is left: what each thread does.
+def _price_each(counter, points, grids, common, kind, pose, change, weight, built, places, which, out, prices):
+    """Price tile after tile, until none is left: what each thread does.
 
     In:
-      counter (1,): strips that some thread has taken so far; counted on.
-      first, second, first_home, second_home, common, kind, pose, change, weight, built, places: as of
-        `price_candidates`.
+      counter (1,): tiles that some thread has taken so far; counted on.
+      points: both grids in the frames of their bodies, and at the start, as of `price_candidates`.
+      grids: of `tile_interpolation.smoothness`.
+      common, kind, pose, change, weight, built, places, which: as of `price_candidates`.
     Out:
-      out (strips, tiles, TILE_NUMBERS): as of `price_candidates`.
+      out (K, TILE_NUMBERS), prices: as of `price_candidates`.
     """
-    member = np.empty((MEMBER, TALL * BROAD))
-    price = np.empty(TALL * BROAD)
-    home = np.empty(TALL * BROAD)
-    block = block_of(kind, np.int64(TALL * BROAD), np.int64(BROAD if kind == 0 else 0))
+    member = np.empty((MEMBER, PLACES))
     member[STIFFNESS] = common[K]
     member[DAMPING] = common[C]
     member[PRELOAD] = common[F0]
-    near = np.empty(2)
-    i = taken(counter)
-    while i < out.shape[0]:
-        for j in range(out.shape[1]):
-            _fill_tile(first, second, first_home, second_home, i * TALL, j * BROAD, common[FREE], member, home, near)
-            price[:] = 0.0
-            design_of_members(
-                np.int64(0), np.int64(0), np.int64(TALL * BROAD), block, near, member, pose, change, weight, price
-            )
-            tile = i * out.shape[1] + j
-            for at in range(built[tile], built[tile + 1]):
-                price[places[at]] = np.inf
-            sum_tile(price, home, common, out[i, j])
-        i = taken(counter)
+    scratch = make_scratch()
+    price = np.empty(PLACES)
+    home = np.zeros(PLACES)
+    states = (pose, change, weight)
+    across = (points[1].shape[1] + BROAD - 1) // BROAD
+    k = taken(counter)
+    while k < which.shape[0]:
+        tile = which[k]
+        i = tile // across
+        j = tile % across
+        price[:] = np.inf
+        computed = _price_tile(points, grids, i, j, common, kind, states, member, scratch, price)
+        fill_lengths(points[2], points[3], i, j, home)
+        for at in range(built[tile], built[tile + 1]):
+            price[places[at]] = np.inf
+        sum_tile(price, home, common, out[k])
+        out[k, COMPUTED] = computed
+        if prices.shape[0] > 0:
+            prices[k] = price
+        k = taken(counter)
 
 
-@part
-def _fill_tile(first, second, first_home, second_home, row, column, free, member, home, near):
-    """Write the candidates of a tile as members.
+@kernel
+def _price_tile(points, grids, i, j, common, kind, states, member, scratch, price):
+    """The prices of a tile.
 
     In:
-      first, second, first_home, second_home: as of `price_candidates`.
+      points, grids, common, kind: as of `_price_each`.
+      i, j: the tile.
+      states: pose, change, weight, as of `price_members`.
+    Out:
+      price (PLACES,): of its candidates.
+    Scratch:
+      member (MEMBER, PLACES): whose stiffness, damping and preload are known.
+      scratch: of `tile_interpolation.make_scratch`.
+
+    Returns how many prices were computed.
+    """
+    plan, level, rows, columns, _, asked, trace, room = scratch
+    error = common[ERROR]
+    near = np.empty(2)
+    trace[:] = 0
+    begin_tile(error, plan, level)
+    while ask(grids, i, j, plan, level, rows, columns):
+        wide = plan[COLUMNS]
+        count = plan[ROWS] * wide
+        _fill_asked(points, i * TALL, j * BROAD, rows[: plan[ROWS]], columns[:wide], common[FREE], member, near)
+        asked[:count] = 0.0
+        design_of_members(
+            np.int64(0), np.int64(0), count, block_of(kind, count, wide if kind == 0 else 0), near, member, states[0],
+            states[1], states[2], asked,
+        )  # fmt: skip
+        take(grids, i, j, error, plan, level, rows, columns, asked, trace, room, price)
+    return plan[ASKED]
+
+
+@kernel
+def _fill_asked(points, row, column, rows, columns, free, member, near):
+    """Write candidates of a tile as members, row by row.
+
+    In:
+      points: as of `_price_each`.
       row, column: where the tile begins.
+      rows, columns: the candidates, by their places in the tile, whole vectors of columns.
       free: the free length (m); negative: the initial one.
     Out:
-      member (MEMBER, TALL BROAD): points, free length, excess; as of `Model.member`.
-      home (TALL BROAD,): initial lengths (m).
+      member (MEMBER, PLACES): points, free length, excess; as of `Model.member`.
       near (2,): as a row of `Model.near`.
     """
+    first, second, first_home, second_home = points
+    wide = columns.shape[0]
+    end = np.empty((4, BROAD))
+    for b in range(wide):
+        at = column + columns[b]
+        for d in range(2):
+            end[d, b] = second[d, at]
+            end[2 + d, b] = second_home[d, at]
     shortest = zero() - np.inf
     longest = zero()
     far = zero()
-    for i in range(0, BROAD, lanes()):
-        x = load(second[0], column + i)
-        y = load(second[1], column + i)
-        hx = load(second_home[0], column + i)
-        hy = load(second_home[1], column + i)
+    for i in range(0, wide, lanes()):
+        x = load(end[0], i)
+        y = load(end[1], i)
+        hx = load(end[2], i)
+        hy = load(end[3], i)
         far = larger(x * x + y * y, far)
-        for j in range(TALL):
-            at = j * BROAD + i
-            rx = hx - first_home[0, row + j]
-            ry = hy - first_home[1, row + j]
+        for a in range(rows.shape[0]):
+            at = a * wide + i
+            own = row + rows[a]
+            rx = hx - first_home[0, own]
+            ry = hy - first_home[1, own]
             r2 = rx * rx + ry * ry
             length = r2 * inverse_root(r2, ZERO_LENGTH_SQUARED)
             shortest = larger(zero() - length, shortest)
             longest = larger(length, longest)
-            store(member[PX], at, zero() + first[0, row + j])
-            store(member[PY], at, zero() + first[1, row + j])
+            store(member[PX], at, zero() + first[0, own])
+            store(member[PY], at, zero() + first[1, own])
             store(member[QX], at, x)
             store(member[QY], at, y)
-            store(home, at, length)
             if free < 0.0:
                 store(member[L0], at, length)
                 store(member[EXCESS], at, zero())
@@ -340,17 +417,17 @@ def sum_tile(price, home, common, out):
     """What is kept of a tile.
 
     In:
-      price (TALL BROAD,): of the candidates; infinite where one does not count.
-      home (TALL BROAD,): their initial lengths (m).
+      price (PLACES,): of the candidates; infinite where one does not count.
+      home (PLACES,): their initial lengths (m).
       common (COMMON,): what they have in common.
     Out:
-      out (TILE_NUMBERS,): overwritten.
+      out (TILE_NUMBERS,): overwritten, but for COMPUTED.
     """
     seen = zero()
     best = zero() - np.inf
     gains = zero()
     ratio = zero()
-    for at in range(0, TALL * BROAD, lanes()):
+    for at in range(0, PLACES, lanes()):
         length = load(home, at)
         found = load(price, at)
         cost = length if common[COST] < 0.0 else zero() + common[COST]

@@ -1,6 +1,6 @@
 """Springs between free bodies, for the engine: their scenes, and a driver that simulates and differentiates them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pkgutil import resolve_name
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -104,11 +104,16 @@ def _scenes(case: Case) -> Mapping[str, Scene]:
 
 
 def _candidates(
-    scenes: Mapping[str, Scene], place: int, group: MemberGroup, homes: tuple[FloatArray, FloatArray], count: int | None
+    scenes: Mapping[str, Scene],
+    places: Sequence[int],
+    group: MemberGroup,
+    homes: tuple[FloatArray, FloatArray],
+    count: int | None,
 ) -> "SpringCandidates":
-    """The candidates of a priced group; all load cases have the same."""
+    """The candidates of a priced group without mirror images; all load cases have the same."""
     from mdstopo.sensitivity.springs_pricing import SpringCandidates
 
+    (place,) = places
     return SpringCandidates(group, next(iter(scenes.values())).model.block[place], homes, count)
 
 

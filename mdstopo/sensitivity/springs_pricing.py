@@ -32,7 +32,7 @@ from mdstopo.scene.springs_model import (
 )
 from mdstopo.sensitivity import springs_candidate_prices as kernels
 from mdstopo.sensitivity.candidate_pass import CandidatePass
-from mdstopo.sensitivity.springs_candidate_prices import BROAD, F0, FREE, NO_ROOM, TALL, TILE_NUMBERS, C, K
+from mdstopo.sensitivity.springs_candidate_prices import F0, FREE, NO_ROOM, C, K
 
 if TYPE_CHECKING:
     from mdstopo.sensitivity.springs_driver import SpringsDriver
@@ -108,20 +108,25 @@ class SpringCandidates(CandidatePass[SpringPricingStates]):
         self._first, self._second = (group.from_local, group.to_local)[self.order]
         self._far = float(np.sqrt((self._second**2).sum(axis=1).max()))
 
-    def tiles(self, states: SpringPricingStates, worth: float, built: tuple[IndexArray, IndexArray]) -> FloatArray:
-        """(T, TILE_NUMBERS): what `price_candidates` keeps of each tile."""
-        law, common = self._law, self.common(worth)
+    def common(self, states: SpringPricingStates, worth: float) -> FloatArray:
+        """See `CandidatePass.common`; with the law."""
+        law, common = self._law, super().common(states, worth)
         common[[K, C, F0]] = law.stiffness, law.damping, law.preload
         common[FREE] = -1.0 if law.free_length is None else law.free_length
+        return common
+
+    def fill_tiles(
+        self, states: SpringPricingStates, common: FloatArray, which: IndexArray, out: FloatArray, prices: FloatArray
+    ) -> None:
+        """See `CandidatePass.fill_tiles`."""
         rows, columns = self.chosen
-        first, second = _padded(self._first[rows], TALL), _padded(self._second[columns], BROAD)
-        homes = _padded(self.homes[0][rows], TALL), _padded(self.homes[1][columns], BROAD)
-        out = np.empty((*self.shape, TILE_NUMBERS))
+        ends = (self._first[rows], self._second[columns], self.homes[0][rows], self.homes[1][columns])
+        first, second, first_home, second_home = (np.ascontiguousarray(each.T) for each in ends)
         pose, change, weight = states.of_pair(self.pair)
         kernels.price_candidates(
-            first, second, *homes, common, self._kind, pose, change, weight, *built, allowed(), out
-        )
-        return out.reshape(-1, TILE_NUMBERS)
+            first, second, first_home, second_home, *self.smoothness, common, self._kind, pose, change, weight,
+            *self.by_tile, which, allowed(), out, prices,
+        )  # fmt: skip
 
     def prices_between(self, states: SpringPricingStates, a: IndexArray, b: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from first points to second ones."""
@@ -142,10 +147,3 @@ class SpringCandidates(CandidatePass[SpringPricingStates]):
             kernels.price_members(member, self._kind, near, *own, out)
             found[part] = out[:count]
         return found
-
-
-def _padded(points: FloatArray, multiple: int) -> FloatArray:
-    """Points (n, 2) as (2, n), behind them such as are nowhere, up to a multiple."""
-    padded = np.full((2, -(-len(points) // multiple) * multiple), np.nan)
-    padded[:, : len(points)] = points.T
-    return padded

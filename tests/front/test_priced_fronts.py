@@ -19,7 +19,7 @@ from mdstopo.status import RunStatus
 from mdstopo.store.result_reader import read_result
 from mdstopo.store.stored_case import case_of
 from tests.front.test_fronts import assert_equal
-from tests.session.test_priced_candidates import case_from, stiff, two_objectives
+from tests.session.test_priced_candidates import case_from, stiff, symmetric, two_objectives
 
 #: the optimiser comes near soon
 LOOSE = {"optimizer": {"tolerance": 1e-4}}
@@ -57,6 +57,20 @@ def test_points_are_optima_of_all_candidates_each_with_its_own_members(tmp_path:
     for row, objectives in zip(alpha, view.array("pareto/objectives"), strict=True):
         found = Evaluator(built).evaluate(row, False).objectives
         assert [found["P"], found["T"]] == pytest.approx(objectives.tolist(), rel=1e-9)
+
+
+def test_every_point_has_members_together_with_their_mirror_images(tmp_path: Path) -> None:
+    scene = symmetric() | LOOSE | {"combine": {"weights": {"G": 1, "T": 1}}}
+    scene["objectives"]["T"] = {"response": {"displacement": {"body": "engine", "component": "x"}}, "over_time": "rms"}
+    found = run_front(case_from(scene), asked(), path=tmp_path / "a.h5", workers=1)
+    assert found.status is RunStatus.CONVERGED
+    view = read_result(tmp_path / "a.h5")
+    left, right = case_of(view).members
+    assert np.array_equal(left.from_index, right.from_index)
+    assert np.array_equal(left.to_index, right.to_index)
+    for row in view.array("pareto/alpha"):
+        assert np.count_nonzero(row) > 0
+        assert np.array_equal(*np.split(row, 2))
 
 
 def test_a_stopped_front_resumes_to_the_bit(tmp_path: Path) -> None:

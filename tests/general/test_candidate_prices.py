@@ -9,6 +9,8 @@ from mdstopo.case import candidates
 from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
+from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
+from tests.sensitivity.test_candidate_prices import assert_dense_pass_is_right
 
 #: relative to the largest
 AGREE = 1e-10
@@ -253,6 +255,42 @@ def test_prices_in_space_of_laws_that_switch_come_to_the_gradient_as_steps_becom
     assert short <= long / 256.0
 
 
+def test_the_price_of_mirror_images_is_the_sum_of_theirs():
+    """Two groups with one alpha for a member and its image: the gradient by that alpha."""
+    scene = arm(law={**SPRING, "damping": 7})
+    scene["points"] |= {
+        "p2": {"body": "foot", "grid": {"line": {"from": [0.8, -0.3], "to": [1.0, -0.6], "count": 9}}},
+        "q2": {"body": "ground", "grid": {"line": {"from": [2, -1.1], "to": [0.2, -1], "count": 21}}},
+    }
+    scene["members"]["image"] = {**scene["members"]["web"], "from": "p2", "to": "q2", "cost": 1}
+    scene["members"]["web"]["cost"] = 1
+    scene["design"]["mirrored"] = [["web", "image"]]
+    scene["constraints"] = [{"volume": "all", "limit": 30}]
+    solver = {"step": STEP, "integrator": "runge_kutta"}
+    case = read_case(json.dumps({"format": 1, **scene, "solver": solver}))
+    web, image = case.members[0], case.members[-1]
+    assert np.array_equal(web.from_index, image.from_index)
+    width = len(web.to_local)
+    i, j = np.divmod(np.arange(web.candidates.count), width)
+    whole = with_members(case, {"web": (i, j), "image": (i, j)})
+    evaluator = Evaluator(case)
+    problem = evaluator.problem()
+    x = np.random.default_rng(5).uniform(0.1, 1.0, case.space.size)
+    evaluation = problem.evaluation(x)
+    states = problem.pricing_states(evaluation, np.ones(len(problem.sample_of(evaluation).rows)))
+    built = web.from_index * width + web.to_index
+    alpha = np.zeros(whole.space.size)
+    alpha[whole.space.slots[whole.group_slices["web"]][built]] = x[case.space.slots[case.group_slices["web"]]]
+    tie = case.group_slices["tie"]
+    alpha[whole.space.slots[whole.group_slices["tie"]]] = x[case.space.slots[tie]]
+    gradient = Evaluator(whole).problem().evaluate(alpha).gradients.sum(axis=0)[: len(i)]
+    found = evaluator.candidates_of(web).prices(states, i, j)
+    assert np.abs(found - gradient).max() <= AGREE * np.abs(gradient).max()
+    alone = read_case(json.dumps({"format": 1, **scene, "solver": solver, "design": {"lower": 0, "initial": 0.4}}))
+    apart = Evaluator(alone).candidates_of(alone.members[0]).prices(states, i, j)
+    assert np.abs(apart - gradient).max() > 0.01 * np.abs(gradient).max()
+
+
 def test_a_pass_finds_the_best_candidates_and_what_all_gain():
     scene = Priced(arm(SEVERAL, **looked(PULL, "mean")))
     gradient, size = scene.gradient, scene.size
@@ -267,6 +305,30 @@ def test_a_pass_finds_the_best_candidates_and_what_all_gain():
     assert told == sorted(zip(scene.i[~scene.built].tolist(), scene.j[~scene.built].tolist(), strict=True))
     wanted = gain.reshape(9, 21)[found.i, found.j]
     assert np.abs(found.gain - wanted).max() <= AGREE * size
+
+
+@pytest.mark.parametrize(
+    ("law", "error"),
+    [
+        ({**SPRING, "damping": 7, "preload": 2}, 1e-12),
+        ({"type": "cubic", "stiffness": 500, "cubic": 9000}, 1e-12),
+        ({"type": "gap", "stiffness": 900, "gap": 0.01, "side": "compression"}, 1e-9),
+    ],
+    ids=["springs", "cubic", "gap"],
+)
+def test_a_dense_pass_computes_few_of_the_prices_and_knows_all(law, error):
+    scene = arm(law)
+    # every point of the foot with every point of a piece of ground: the ground's points are the rows of tiles
+    scene["points"]["p"]["grid"] = {"line": {"from": [0.9, -0.3], "to": [0.91, -0.315], "count": BROAD}}
+    scene["points"]["q"]["grid"] = {"line": {"from": [1.2, -1.1], "to": [1.21, -1.1], "count": 2 * TALL}}
+    case = read_case(json.dumps({"format": 1, **scene, "solver": {"step": STEP, "integrator": "runge_kutta"}}))
+    evaluator = Evaluator(case)
+    problem = evaluator.problem()
+    evaluation = problem.evaluation(np.full(case.n_design, 0.2))
+    states = problem.pricing_states(evaluation, np.ones(len(problem.sample_of(evaluation).rows)))
+    candidates = evaluator.candidates_of(case.members[0])
+    sample = candidates.prices(states, *np.divmod(np.arange(case.members[0].candidates.count), 2 * TALL))
+    assert_dense_pass_is_right(candidates, states, np.abs(sample).max(), error)
 
 
 def test_a_pass_over_a_part_of_the_candidates_prices_them_as_the_whole_pass_does():

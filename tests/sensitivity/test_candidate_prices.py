@@ -8,7 +8,8 @@ import pytest
 from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.sensitivity.springs_candidate_prices import BROAD, TALL
+from mdstopo.sensitivity.springs_candidate_prices import BEST, COMPUTED, ERROR, SEEN
+from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
 
 #: relative to the largest
 AGREE = 1e-10
@@ -129,6 +130,36 @@ def test_a_pass_finds_the_best_candidates_and_what_all_gain(name):
     by_pair = dict(zip(zip(i.tolist(), j.tolist(), strict=True), gain.tolist(), strict=True))
     wanted = [by_pair[pair] for pair in zip(found.i.tolist(), found.j.tolist(), strict=True)]
     assert np.abs(found.gain - wanted).max() <= AGREE * size
+
+
+@pytest.mark.parametrize("name", ["mean", "damped", "free length", "filtered"])
+def test_a_dense_pass_computes_few_of_the_prices_and_knows_all(name):
+    scene = json.loads(json.dumps(SCENES[name]))
+    for grid, count in (("p", 3 * TALL), ("q", 2 * BROAD)):
+        line = scene["points"][grid]["grid"]["line"]
+        line["to"] = (0.95 * np.array(line["from"]) + 0.05 * np.array(line["to"])).tolist()
+        line["count"] = count
+    if name == "filtered":  # some of them
+        scene["members"]["web"]["max_length"] = 1.48
+    candidates, _, states, gradient, _, _ = priced(scene)
+    size = np.abs(gradient).max()
+    assert_dense_pass_is_right(candidates, states, size, 1e-12)
+
+
+def assert_dense_pass_is_right(candidates, states, size, error):
+    """A pass over all tiles is, tile by tile, what it is with every price computed; error: relative to `size`."""
+    common = candidates.common(states, 0.1 * size)
+    every = np.arange(candidates.shape[0] * candidates.shape[1])
+    few, prices = candidates.tiles(states, common, every, True)
+    assert 0.0 < common[ERROR] <= 1.01 * error * size
+    common[ERROR] = 0.0
+    all_of_them, exact = candidates.tiles(states, common, every, True)
+    assert few[:, COMPUTED].sum() < 0.25 * all_of_them[:, COMPUTED].sum()
+    assert np.array_equal(few[:, SEEN], all_of_them[:, SEEN])
+    assert np.array_equal(np.isfinite(prices), np.isfinite(exact))
+    there = np.isfinite(exact)
+    assert np.abs(prices[there] - exact[there]).max() <= 10.0 * error * size
+    assert np.abs(few[:, BEST] - all_of_them[:, BEST]).max() <= 10.0 * error * size
 
 
 def test_of_many_that_pay_some_of_every_tile_are_told():

@@ -243,6 +243,44 @@ def test_the_optimum_is_that_of_all_candidates_whatever_the_case(scene: Any, few
     assert "no one of 640 candidates would lower G by more than 1e-06 of it" in priced.reason
 
 
+def symmetric(candidates: str = "priced") -> dict[str, Any]:
+    """The stiff engine on struts to the left and to the right, each with the alpha of its mirror image."""
+    scene = stiff(candidates) | {"points": {}, "members": {}}
+    for side, sign in (("left", -1), ("right", 1)):
+        lines = {"mounts": ([0.25, -0.25], [0.25, 0.25], 8), "frame": ([1, -0.8], [1.2, 0.9], 20)}
+        for name, (begin, end, count) in lines.items():
+            ends = {"from": [sign * begin[0], begin[1]], "to": [sign * end[0], end[1]]}
+            body = "engine" if name == "mounts" else "ground"
+            scene["points"][f"{name}_{side}"] = {"body": body, "grid": {"line": ends | {"count": count}}}
+        scene["members"][side] = {
+            "from": f"mounts_{side}", "to": f"frame_{side}", "law": {"type": "spring", "stiffness": 20000},
+            "candidates": candidates,
+        }  # fmt: skip
+    scene["design"]["mirrored"] = [["left", "right"]]
+    return scene
+
+
+def other_lengths(scene: dict[str, Any]) -> None:
+    """Have members cost their lengths, and those on the right longer than their images."""
+    for group in scene["members"].values():
+        group["cost"] = "length"
+    scene["points"]["frame_right"]["grid"]["line"]["to"] = [1.2, 1]
+
+
+def test_mirror_images_are_priced_together(few: None) -> None:
+    priced, whole = run_session(case_from(symmetric())), run_session(case_from(symmetric("enumerated")))
+    assert priced.status is whole.status is RunStatus.CONVERGED, (priced.reason, whole.reason)
+    assert priced.pricing is not None
+    assert priced.pricing.rounds > 1
+    assert priced.pricing.candidates == whole.case.n_design == 320
+    assert priced.case.n_design < 200
+    assert abs(priced.objectives["G"] / whole.objectives["G"] - 1.0) <= 1e-6
+    left, right = priced.case.members
+    assert np.array_equal(left.from_index, right.from_index)
+    assert np.array_equal(left.to_index, right.to_index)
+    assert np.array_equal(*np.split(priced.alpha, 2))
+
+
 def largest_gain(outcome: Outcome, whole: Case) -> float:
     """The largest gain of a candidate that is not built, relative to U, from the gradient of all of them."""
     built = Evaluator(outcome.case)
@@ -319,6 +357,33 @@ def test_what_does_not_go_with_prices_is_refused(changes: dict[str, Any], key: s
     assert words in mistake.message
     with pytest.raises(CaseError, match=words):
         run_session(case)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda scene: scene["members"]["right"].update(candidates="enumerated"), "those of the other are not"),
+        (
+            lambda scene: scene["members"]["right"].update(cost=2),
+            "costs, min_length and max_length have to be the same",
+        ),
+        (
+            lambda scene: scene["points"]["mounts_right"]["grid"]["line"].update(count=9),
+            "from has 8 points in one and 9 in",
+        ),
+        (other_lengths, "are no mirror images"),
+        (
+            lambda scene: scene["members"]["right"].update({"from": "frame_right", "to": "mounts_right"}),
+            "from has 8 points in one and 20 in",
+        ),
+    ],
+)
+def test_groups_that_are_no_mirror_images_are_mistakes(change: Any, words: str) -> None:
+    scene = symmetric()
+    change(scene)
+    with pytest.raises(CaseError, match="'left' and 'right' cannot be priced together") as told:
+        case_from(scene)
+    assert words in str(told.value)
 
 
 @pytest.mark.parametrize(
