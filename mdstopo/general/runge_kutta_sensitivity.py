@@ -70,6 +70,12 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
 
 
 @kernel
+def carried(tag):
+    """A step takes nothing over but the state."""
+    return 0
+
+
+@kernel
 def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
     """On a parabola with the accelerations at c; see `method_interface.beside`. Not used: history, k, c."""
     advance_coordinates(model, q, v, a, e, q_out)
@@ -102,6 +108,7 @@ COMMON: dict[str, Any] = {
     "point_of": point_of,
     "step_back": step_back,
     "step_forward": step_forward,
+    "carried": carried,
     "beside": beside,
     "derivatives": derivatives,
     "is_continuous": is_continuous,
