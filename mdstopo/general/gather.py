@@ -3,6 +3,7 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.general.balance_slopes import add_numbers
 from mdstopo.general.expressions import FIRST_PART
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.general_model import (
@@ -22,7 +23,6 @@ from mdstopo.general.general_model import (
 from mdstopo.general.general_responses import MEMBER_FORCE, member_force
 from mdstopo.general.members import MODE, SET, level_of, rate_of_row
 from mdstopo.general.parameters import add_force_parameters, add_parameters
-from mdstopo.general.scene_numbers import add_numbers
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
 from mdstopo.general.switches import carriers
@@ -120,7 +120,6 @@ def _add(model, segment, when, member_state, q, v, a, turned, z, weight, out):
     n_pair = model.pair.shape[0]
     rel = np.empty((count, n_pair, pose_size(model)))
     u = np.empty((count, n_pair, freedoms(model)))
-    row = np.empty(pair_freedoms(model))
     carries = carriers(model)
     for j in range(count):
         for p in range(n_pair):
@@ -147,6 +146,7 @@ def _add(model, segment, when, member_state, q, v, a, turned, z, weight, out):
                     member_state[MODE], rel[j, p], u[j, p], weight, out,
                 )  # fmt: skip
                 continue
+            row = np.empty(pair_freedoms(model))
             for i in range(lo, lo + model.block[k, COUNT]):
                 f = inerter_force(model, k, i, q[j], v[j], a[j], row)
                 out[i] -= f * rate_of_row(model, p, row, z[j])

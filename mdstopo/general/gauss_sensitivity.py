@@ -398,32 +398,57 @@ def _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change
 
 @kernel
 def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
-    """Push changes through window w (`method_interface`).
+    """Push R changes through window w (`method_interface`).
 
     Constant:
       tag, tables (n_level, 7, s_max, s_max): the integrator; of `gauss_tables`.
       model: the compiled scene.
       history, w, c: the history of steps, the window, and the fraction of it at which it is taken to end.
-      force (s, n): changes of the force at each node.
+      force (R, s or more, n): changes of the force at each node.
     In and out:
-      dq, dv (n,): changes of coordinates and velocities, of the start and then of the end.
+      dq, dv (R, n): changes of coordinates and velocities, of the start and then of the end.
     Out:
-      changes (s, 3, n): changes of the nodes' q, v, a.
+      changes (R, s or more, 3, n): changes of the nodes' q, v, a.
 
     Not needed here: sweeps, dx, rows; of the workspace only its switches.
 
     Returns True: the sweeps that solve the equations are not those of the iterative method.
     """
-    n = dq.shape[0]
-    o, s, h = stages_of(history, w)
+    _, s, _ = stages_of(history, w)
     planes = tables[level_of(s)]
     m = moving(model)
-    width = row_width(m)
     maps = np.zeros((s, model.home.shape[0], window_size(model)))
     _node_maps(model, history, w, maps)
     inverse = _inverse_masses(model)
     dense = _dense_slopes(model, workspace, history, w, inverse, maps, np.bool_(False))
-    room = make_rows(s * 6, m).reshape((6, s, width))
+    room = make_rows(s * 6, m).reshape((6, s, row_width(m)))
+    for r in range(dq.shape[0]):
+        _row_forward(
+            model, planes, history, w, c, workspace, inverse, maps, dense, room, dq[r], dv[r], force[r], changes[r]
+        )
+    return True
+
+
+@kernel
+def _row_forward(model, planes, history, w, c, workspace, inverse, maps, dense, room, dq, dv, force, changes):
+    """`step_forward` for one of the R changes.
+
+    Constant:
+      model: the compiled scene.
+      planes (7, s_max, s_max): of `gauss_tables`, for the window's number of nodes.
+      history, w, c: the history of steps, the window, and the fraction of it at which it is taken to end.
+      workspace: the workspace, for its switches.
+      inverse (n,): inverse masses; 0 of ground. maps (s, n_body, MAPS), dense (2, s, M, W): of the nodes.
+      force (s or more, n): changes of the force at each node.
+    In and out:
+      dq, dv (n,): changes of coordinates and velocities, of the start and then of the end.
+    Out:
+      changes (s or more, 3, n): changes of the nodes' q, v, a. room (6, s, W): scratch; its last row is of zeros.
+    """
+    n = dq.shape[0]
+    o, s, h = stages_of(history, w)
+    m = moving(model)
+    width = room.shape[2]
     given = room[0]
     du = room[1]
     by_x = room[2]
@@ -502,7 +527,12 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
     window_start_jvp(model, at, dq, change[0])
     copy_vector(change[0], dq)
     copy_vector(change[1], dv)
-    return True
+
+
+@kernel
+def carried(tag):
+    """A window takes nothing over but the state."""
+    return 0
 
 
 implement(
@@ -511,6 +541,7 @@ implement(
     step_back=step_back,
     step_forward=step_forward,
     state_at_offset=state_at_offset,
+    carried=carried,
     derivatives=derivatives,
     is_continuous=is_continuous,
     is_explicit=is_explicit,

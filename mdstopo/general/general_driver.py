@@ -1,6 +1,6 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -114,7 +114,10 @@ class GeneralDriver:
             np.zeros((1, 3)),
         )  # fmt: skip
         self._integral_gradient = np.zeros(n_design + varied)
-        self._row_gradients = RowGradients(self)
+        #: gradients of the rows that were found, and arrays for so many rows at once
+        self.row_gradients = RowGradients(self)
+        self._no_slopes = np.zeros((0, 0))
+        self._arrays: dict[str, list[FloatArray]] = {}
         self._make_rows(ROWS)
         self.start_vjp = np.zeros(n if case.solver.settle else 0)
         self.events = 0
@@ -262,7 +265,7 @@ class GeneralDriver:
                 for j, reduction in enumerate(self.scene.reductions):
                     self._reduce_response(j, reduction, count, gradient, window)
             if gradient and not differentiated:
-                self._row_gradients(count, across)
+                self.row_gradients(count, across)
             status, message = self._without_value(gradient)
         grazing, meeting = self._grazing(), int(self.where[1])
         return ResponseResult(
@@ -402,6 +405,17 @@ class GeneralDriver:
         )  # fmt: skip
         return found
 
+    def arrays_once(self, name: str, make: Callable[[], list[FloatArray]]) -> list[FloatArray]:
+        """Arrays for an entry that `ready` prepares, made at the first use under this name."""
+        if name not in self._arrays:
+            self._arrays[name] = make()
+        return self._arrays[name]
+
+    @property
+    def keeps_tangents(self) -> bool:
+        """Whether steps have their tangents without being asked for them."""
+        return self.method.collocates or not self.method.kind.adaptive
+
     @property
     def steps_are_fine(self) -> bool:
         """Whether no step is as long as a vibration (`peak_search.sample_steps`)."""
@@ -520,7 +534,7 @@ class GeneralDriver:
     def start_slopes(self) -> FloatArray:
         """(M_padded + P, n): derivatives of the start's positions by alpha^mu and values; no rows where it is as
         stated."""
-        return np.zeros((0, 0)) if self.start is None else self.start.slopes()
+        return self._no_slopes if self.start is None else self.start.slopes()
 
     def settle(self, design: FloatArray) -> bool:
         """Take a design (`take`) and move the start to its equilibrium where the case asks for it; False where there is
@@ -542,7 +556,7 @@ class GeneralDriver:
             entry.peaks_vjp.compile(*self._plain_arguments(0, 0.0))
             return
         if not all(reduction.is_integral for reduction in reductions):
-            self._row_gradients.compile()
+            self.row_gradients.compile()
         if any(reduction.is_largest for reduction in reductions):
             entry.peaks_of_steps.compile(*self._history_arguments(0), 0, True, True, 0.0, self._rows_of[0], self.work)
 

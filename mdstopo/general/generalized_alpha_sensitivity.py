@@ -12,8 +12,14 @@ from mdstopo.general.accelerations import OF_STEP
 from mdstopo.general.generalized_alpha import TAG
 from mdstopo.general.method_interface import implement
 from mdstopo.general.projection import project_back, project_forward
-from mdstopo.general.step_history import FIRST
-from mdstopo.general.step_linear import prepare_stage_back, stage_back, stage_forward
+from mdstopo.general.step_history import FIRST, copy_vector
+from mdstopo.general.step_linear import (
+    keep_free,
+    prepare_stage_back,
+    prepare_stage_forward,
+    stage_back,
+    stage_forward,
+)
 from mdstopo.integrators.springs_generalized_alpha import weights_of as alpha_weights
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -90,12 +96,13 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
     last = history.index[w + 1, FIRST] - 1 - o
     h = history.t[w + 1] - history.t[w]
     weights = alpha_weights(tables[0])
-    bar_q = np.zeros((count, n))
-    bar_v = np.zeros((count, n))
-    bar_a = np.zeros((count, n))
-    bar_x = np.zeros((count, n))
-    start_q = np.zeros((count, n))
-    start_v = np.zeros((count, n))
+    bar = np.zeros((6, count, n))
+    bar_q = bar[0]
+    bar_v = bar[1]
+    bar_a = bar[2]
+    bar_x = bar[3]
+    start_q = bar[4]
+    start_v = bar[5]
     work[REVERSE] += count
     for m in range(count):
         cubic_vjp(
@@ -208,65 +215,113 @@ def _stage_row_back(
 def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
     """Push changes at the start of step w through its stages to its end; see `method_interface.step_forward`.
 
-    dx (2, n) belongs to the acceleration and the auxiliary one; tables (1,): the spectral radius.
+    dx (R, 2, n) belongs to the acceleration and the auxiliary one; tables (1,): the spectral radius.
     """
-    n = dq.shape[0]
+    count, n = dq.shape
     o = history.index[w, FIRST]
     last = history.index[w + 1, FIRST] - 1 - o
     h = history.t[w + 1] - history.t[w]
-    e1, e2, e3, beta, gamma, lag = alpha_weights(tables[0])
-    da = dx[0]
-    aux = dx[1]
-    end_q = np.empty(n)
-    end_v = np.empty(n)
+    weights = alpha_weights(tables[0])
+    e1, _, _, beta, gamma, _ = weights
     shift = np.empty(n)
     settled = True
     for j in range(last + 1):
-        x = changes[j, 0]
-        u = changes[j, 1]
-        f = changes[j, 2]
-        rows[j] = 0.0
-        for d in range(n):
-            f[d] = force[j, d]
-            if j == last:
-                carry = e2 * da[d] - e3 * aux[d]
-                shift[d] = h * (dv[d] + h * ((0.5 - beta) * aux[d] + beta * carry))
-                u[d] = dv[d] + h * ((1.0 - gamma) * aux[d] + gamma * carry)
-            elif j == 0:
-                shift[d] = 0.0
-                u[d] = dv[d]
-            else:
-                shift[d] = lag * h * (dv[d] + 0.5 * lag * h * da[d])
-                u[d] = dv[d] + lag * h * da[d]
-        retract_jvp(model, history.q[w], history.stage_q[o + j], dq, shift, x)
-        for d in range(n):
-            if model.free[d] == 0:
-                x[d] = 0.0
-                u[d] = 0.0
         w_q = h * h * beta * e1 if j == last else 0.0
         w_v = h * gamma * e1 if j == last else 0.0
         if j == last:
             shift_tangents(model, history.q[w], history.stage_q[o + j], workspace.tangents[OF_STEP])
-        settled = stage_forward(model, history, o + j, w_q, w_v, sweeps, workspace, x, u, f, rows[j]) and settled
-        if j == last:
-            add_shift(model, workspace.tangents[OF_STEP], w_q, f, x)
-        for d in range(n):
+        k, c_stage = prepare_stage_forward(model, history, o + j, w_q, w_v, sweeps, workspace)
+        for m in range(count):
+            _reach_of_stage(
+                model, history, w, o, j, last, h, weights, dq[m], dv[m], dx[m], force[m, j], changes[m, j], shift
+            )
+            rows[m, j] = 0.0
+            x = changes[m, j, 0]
+            u = changes[m, j, 1]
+            f = changes[m, j, 2]
+            settled = (
+                stage_forward(model, history, o + j, k, c_stage, w_q, w_v, sweeps, workspace, x, u, f, rows[m, j])
+                and settled
+            )
             if j == last:
-                u[d] += w_v * f[d]
-                aux[d] = e1 * f[d] + e2 * da[d] - e3 * aux[d]
-                da[d] = f[d]
-            elif j == 0:
-                da[d] = f[d]
-                aux[d] = f[d]
-            else:
-                aux[d] = 2.0 * da[d] - f[d]
-    for d in range(n):
-        end_q[d] = changes[last, 0, d]
-        end_v[d] = changes[last, 1, d]
+                add_shift(model, workspace.tangents[OF_STEP], w_q, f, x)
+                for d in range(n):
+                    u[d] += w_v * f[d]
+            _hand_over(weights, j, last, f, dx[m])
+    end_q = np.empty((count, n))
+    end_v = np.empty((count, n))
+    for m in range(count):
+        copy_vector(changes[m, last, 0], end_q[m])
+        copy_vector(changes[m, last, 1], end_v[m])
     push = history.push[w + 1]
     project_forward(model, history.q[w + 1], history.v[w + 1], push[0], push[1], workspace, end_q, end_v)
-    cubic_jvp(model, c, h, history.q[w], history.v[w], history.q[w + 1], history.v[w + 1], dq, dv, end_q, end_v)
+    for m in range(count):
+        cubic_jvp(
+            model, c, h, history.q[w], history.v[w], history.q[w + 1], history.v[w + 1], dq[m], dv[m], end_q[m],
+            end_v[m],
+        )  # fmt: skip
     return settled
+
+
+@part
+def _reach_of_stage(model, history, w, o, j, last, h, weights, dq, dv, dx, force, changes, shift):
+    """Changes of the coordinates and velocities of stage j of `step_forward`, without those by its own accelerations.
+
+    Constant:
+      model: the compiled scene.
+      history, w, o, j, last: the history of steps, the step, its first stage, the number of this stage in it, and of
+        its last.
+      h: length of the step (s).
+      weights: of the method (`integrators.springs_generalized_alpha.weights_of`).
+      dq, dv (n,), dx (2, n): changes of the start; of the acceleration and the auxiliary one, as the stages before have
+        left them.
+      force (n,): changes of the forces.
+    Out:
+      changes (3, n): those of coordinates and velocities, and `force`.
+      shift (n,): scratch.
+    """
+    _, e2, e3, beta, gamma, lag = weights
+    x = changes[0]
+    u = changes[1]
+    for d in range(dq.shape[0]):
+        changes[2, d] = force[d]
+        if j == last:
+            carry = e2 * dx[0, d] - e3 * dx[1, d]
+            shift[d] = h * (dv[d] + h * ((0.5 - beta) * dx[1, d] + beta * carry))
+            u[d] = dv[d] + h * ((1.0 - gamma) * dx[1, d] + gamma * carry)
+        elif j == 0:
+            shift[d] = 0.0
+            u[d] = dv[d]
+        else:
+            shift[d] = lag * h * (dv[d] + 0.5 * lag * h * dx[0, d])
+            u[d] = dv[d] + lag * h * dx[0, d]
+    retract_jvp(model, history.q[w], history.stage_q[o + j], dq, shift, x)
+    keep_free(model, x)
+    keep_free(model, u)
+
+
+@part
+def _hand_over(weights, j, last, f, dx):
+    """Changes dx (2, n) of the acceleration and the auxiliary one behind stage j, whose accelerations change by f (n,).
+
+    weights: of the method. last: number of the step's last stage.
+    """
+    e1, e2, e3, _, _, _ = weights
+    for d in range(f.shape[0]):
+        if j == last:
+            dx[1, d] = e1 * f[d] + e2 * dx[0, d] - e3 * dx[1, d]
+            dx[0, d] = f[d]
+        elif j == 0:
+            dx[0, d] = f[d]
+            dx[1, d] = f[d]
+        else:
+            dx[1, d] = 2.0 * dx[0, d] - f[d]
+
+
+@kernel
+def carried(tag):
+    """The acceleration and the auxiliary one."""
+    return 2
 
 
 implement(
@@ -275,6 +330,7 @@ implement(
     step_back=step_back,
     step_forward=step_forward,
     state_at_offset=state_at_offset,
+    carried=carried,
     derivatives=derivatives,
     is_continuous=is_continuous,
     is_explicit=is_explicit,

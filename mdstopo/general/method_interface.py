@@ -1,10 +1,10 @@
 """What a method of integration does for responses and sweeps, chosen by its tag when a kernel is compiled.
 
-The tag is a tuple of zeros whose length says which method is meant. A method has eight functions:
+The tag is a tuple of zeros whose length says which method is meant. A method has nine functions:
 
 1. `point_of`: the state inside a step;
 2. `step_back`: a step of the reverse sweep;
-3. `step_forward`: changes pushed through a step;
+3. `step_forward`: changes pushed through a step; `carried`: how many vectors beside the state go with them;
 4. `state_at_offset`: the motion a little later; `derivatives`: how many of its derivatives are those of the balance;
    `is_continuous`: whether states inside a step are at hand; `is_explicit`: whether stages follow from those before
    them, and the first is the start of the step;
@@ -27,6 +27,7 @@ IMPLEMENTED: dict[str, dict[int, Any]] = {
     "step_back": {},
     "step_forward": {},
     "state_at_offset": {},
+    "carried": {},
     "derivatives": {},
     "is_continuous": {},
     "weights_of": {},
@@ -85,23 +86,28 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
 
 
 def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
-    """Push changes through a step.
+    """Push R changes through a step; what a stage needs is formed once for all R.
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
       history, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
       sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most (`iterative`).
-      force (s, n): changes of the force at each stage.
+      force (R, s or more, n): changes of the force at each stage.
     In and out:
-      dq, dv (n,): changes of coordinates and velocities, of the start and then of the end.
-      dx (2, n): those of what the method carries from step to step beside the state.
+      dq, dv (R, n): changes of coordinates and velocities, of the start and then of the end.
+      dx (R, 2, n): those of what the method carries from step to step beside the state.
     Out:
-      changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
+      changes (R, s or more, 3, n), rows (R, s or more, n_row): changes of the stages' q, v, a and multipliers.
       workspace: workspace of a balance, overwritten.
 
     Returns whether all sweeps settled.
     """
+    raise NotImplementedError
+
+
+def carried(tag):
+    """How many vectors (n,) a step hands to the next beside q and v: the first of the two of `step_forward`'s dx."""
     raise NotImplementedError
 
 
@@ -215,7 +221,7 @@ def _of(name: str, tag: Any) -> Any:
 
 
 for _stub in (
-    point_of, step_back, step_forward, state_at_offset, derivatives, is_continuous, weights_of, make_stages, step_error,
-    scheme, is_explicit,
+    point_of, step_back, step_forward, carried, state_at_offset, derivatives, is_continuous, weights_of, make_stages,
+    step_error, scheme, is_explicit,
 ):  # fmt: skip
     by_type(_stub, "tag", partial(_of, _stub.__name__))

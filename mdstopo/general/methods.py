@@ -9,6 +9,7 @@ from mdstopo.case.over_time import ReductionKind
 from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.general.extremes import RATE, SIGN, parts, row_of
 from mdstopo.general.integral_reductions import value_of_integral
+from mdstopo.general.row_gradients import BLOCK, Block, sign_of, wanted_rows
 from mdstopo.integrators.scene_driver import ResponseResult
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.springs_model import FloatArray
@@ -54,15 +55,19 @@ def by_constant_load(
 ) -> tuple[FloatArray, str]:
     """Gradients with inertia and loads frozen; `across` is left as it is."""
     gradients, rows = np.zeros_like(result.gradients), result.rows.copy()
-    count = _run_again(driver, alpha)
     for j, reduction in enumerate(driver.scene.reductions):
         for r in range(int(result.found[j])):
-            gradients[j, r] = _held(driver, j, rows[j, r], reduction, count)
+            gradients[j, r] = _held(driver, j, rows[j, r], reduction, driver.count)
     return gradients, ""
 
 
-def _run_again(driver: "GeneralDriver", alpha: FloatArray) -> int:
-    """Simulate again, with tangents; its work is added to what was counted. Returns how many steps that took."""
+def _with_tangents(driver: "GeneralDriver", alpha: FloatArray) -> int:
+    """Have the motion that was evaluated last with its tangents; returns how many steps it has.
+
+    Where these were left out it is simulated again, and the work is added to what was counted.
+    """
+    if driver.keeps_tangents:
+        return driver.count
     before = driver.work.copy()
     _, count, _ = driver.run(alpha, True, driver.quadrature_breakpoints)
     driver.work += before
@@ -73,29 +78,60 @@ def _carried(
     driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None, sweeps: int
 ) -> tuple[FloatArray, str]:
     """As `by_direct`. sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most."""
-    gradients, message = np.zeros_like(result.gradients), ""
-    rows = result.rows.copy()
-    count = _run_again(driver, alpha)
+    gradients = np.zeros_like(result.gradients)
+    count = _with_tangents(driver, alpha)
+    wanted = wanted_rows(driver, across is not None)[::-1]
+    most = max(1, BLOCK // max(1, len(driver.padded)))
+    for first in range(0, len(wanted), most):
+        part = wanted[first : first + most]
+        block = driver.row_gradients.block(len(part))
+        for m, each in enumerate(part):
+            block.which[m] = each.response, each.is_across
+            block.rows[m] = each.at
+        stopped = _push(driver, count, block, 0, sweeps)
+        if stopped >= 0:
+            return _without_sweeps(driver, alpha, result, across, stopped)
+        for (j, r, is_across, share, row), own in zip(part, block.out, strict=True):
+            _add_since_settled(driver, j, row, bool(is_across), 0, count, own)
+            if is_across and across is not None:
+                across[j, r] += share * own
+            else:
+                gradients[j, r] += sign_of(driver, j, r) * share * own
     for j, reduction in enumerate(driver.scene.reductions):
-        for r in range(int(result.found[j])):
-            aims = [(False, gradients[j, r])]
-            if across is not None and driver.shapes[j] == "norm":
-                aims.append((True, across[j, r]))
-            for integrated, factor, part in _summands(driver, j, rows[j, r], reduction):
-                for is_across, out in aims:
-                    own = np.zeros(gradients.shape[2])
-                    stopped = driver.entry.push(
-                        *driver.steps_arguments(count), j, integrated, sweeps, part, is_across, driver.room,
-                        driver.room_ints, driver.member_state, driver.padded, own, driver.start_slopes(), driver.work,
-                    )  # fmt: skip
-                    if stopped >= 0:
-                        message = FALLBACK.format(float(driver.states()[0][stopped]))
-                        return by_direct(driver, alpha, result, across)[0], message
-                    _add_since_settled(driver, j, part, is_across, integrated, count, own)
-                    out += factor * own
-            if reduction.is_magnitude:
-                gradients[j, r] *= rows[j, r, SIGN]
-    return gradients, message
+        if reduction.is_integral and result.found[j]:
+            integral, row, block = reduction.power, result.rows[j, 0], driver.row_gradients.block(1)
+            block.which[0] = j, 0
+            stopped = _push(driver, count, block, integral, sweeps)
+            if stopped >= 0:
+                return _without_sweeps(driver, alpha, result, across, stopped)
+            _add_since_settled(driver, j, row, False, integral, count, block.out[0])
+            gradients[j, 0] += row.item(RATE) * block.out[0]
+    return gradients, ""
+
+
+def _push(driver: "GeneralDriver", count: int, block: Block, integral: int, sweeps: int) -> int:
+    """Derivatives of the rows of a block, the earliest first, or of an integral, into its `out`.
+
+    driver, count: with a finished run, and how many steps it has. integral, sweeps: as of `direct.push`.
+
+    Returns the step where sweeps did not settle, or -1.
+    """
+    stopped: int = driver.ready(
+        f"push {len(block.rows)}", driver.entry.push, *driver.steps_arguments(count), block.which, block.rows, integral,
+        sweeps, driver.room, driver.room_ints, driver.member_state, block.padded, block.out, driver.start_slopes(),
+        driver.work,
+    )  # fmt: skip
+    return stopped
+
+
+def _without_sweeps(
+    driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None, stopped: int
+) -> tuple[FloatArray, str]:
+    """By `by_direct`, with the sentence that sweeps of the iterative method do not contract in step `stopped`."""
+    message = FALLBACK.format(float(driver.states()[0][stopped]))
+    if across is not None:
+        across[:] = 0.0
+    return by_direct(driver, alpha, result, across)[0], message
 
 
 def _add_since_settled(
@@ -113,18 +149,6 @@ def _add_since_settled(
     since = driver.start.since
     pulled = since.integral_cotangent(j, integral, count) if integral else since.row_cotangent(j, row, is_across, count)
     driver.start.vjp(pulled, out)
-
-
-def _summands(
-    driver: "GeneralDriver", j: int, row: FloatArray, reduction: ReductionKind
-) -> list[tuple[int, float, FloatArray]]:
-    """What a row's derivative is put together from: 1 or 2 for an integral (of the square), factors, and rows.
-
-    driver: with a finished run. j, row, reduction: the response, its row, how it is reduced over time.
-    """
-    slope = row.item(RATE) if reduction.is_integral else 1.0
-    found = [(reduction.power, slope * share, part) for share, part in parts(row)]
-    return found + [(0, factor, at) for factor, at in driver.jumps.get(j, [])]
 
 
 def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: ReductionKind, count: int) -> FloatArray:
@@ -160,15 +184,24 @@ def _held_at(driver: "GeneralDriver", j: int, row: FloatArray, count: int) -> Fl
 
     model = driver.scene.model
     n, size = len(model.mass), len(model.mass) + int(model.size[0])
-    matrix, right, out = np.zeros((size, size)), np.zeros(size), np.zeros(len(driver._alpha))
-    arguments = (
-        *driver.steps_arguments(count), j, row.copy(), driver.room, driver.room_ints, driver.member_state,
-    )  # fmt: skip
-    hold(*arguments, np.zeros(0), matrix, right, driver.padded, out, driver.work)
+    own, none, z, matrix, right, out = driver.arrays_once(
+        "hold", lambda: [np.zeros(k) for k in (len(row), 0, n, (size, size), size, len(driver.alpha))]
+    )
+    own[:] = row
+
+    def call(name: str, given: FloatArray) -> None:
+        driver.ready(
+            name, hold, *driver.steps_arguments(count), j, own, driver.room, driver.room_ints, driver.member_state,
+            given, matrix, right, driver.padded, out, driver.work,
+        )  # fmt: skip
+
+    call("hold for the system", none)
     moving = np.concatenate([np.flatnonzero(model.free), np.arange(n, size)])
-    z = np.zeros(size)
-    z[moving] = np.linalg.pinv(matrix[np.ix_(moving, moving)], rcond=DROPPED).T @ right[moving]
-    hold(*arguments, z[:n].copy(), matrix, right, driver.padded, out, driver.work)
+    found = np.zeros(size)
+    found[moving] = np.linalg.pinv(matrix[np.ix_(moving, moving)], rcond=DROPPED).T @ right[moving]
+    z[:] = found[:n]
+    call("hold for the gradient", z)
+    out = out.copy()
     _add_since_settled(driver, j, row, False, 0, count, out)
     return out
 

@@ -2,7 +2,7 @@
 
 The case is read once more at other numbers, but for what has nothing to do with them. Its arrays take the place of the
 scene's own (`BALANCE`); those with each name a little larger and smaller stand beside it as `GeneralModel.twins`, of
-which kernels make derivatives (`scene_numbers`).
+which kernels make derivatives (`balance_slopes`).
 """
 
 from collections.abc import Callable

@@ -18,6 +18,7 @@ Sets are counted through the blocks of the law, in their order: slots.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.general.balance_slopes import add_start_velocities
 from mdstopo.general.expressions import FIRST_PART
 from mdstopo.general.general_model import (
     ALONG_FREE_LENGTH,
@@ -42,10 +43,8 @@ from mdstopo.general.general_model import (
 from mdstopo.general.general_responses import MEMBER_FORCE, energy_weight, member_force
 from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.parameters import moved_side, varies_member
-from mdstopo.general.scene_numbers import add_start_velocities
 from mdstopo.general.step_history import (
     EVENTS,
-    FIRST,
     MEMBER,
     NEW,
     OLD,
@@ -315,13 +314,15 @@ def time_back(model, history, e, pulled, bar):
 
 
 @kernel
-def time_forward(model, history, e, sets, i):
-    """How much later event e happens because its member's permanent set changes (s per unit of variable i).
+def time_forward(model, history, e, sets, later):
+    """Add how much later event e happens because its member's permanent set changes: later (M_padded + P,), s per unit.
 
-    sets (slots, M_padded + P): derivatives of the sets (m) by each alpha^mu, then by each value; i: one of these.
+    sets (slots, M_padded + P): derivatives of the sets (m) by each alpha^mu, then by each value.
     """
     slot, _ = slot_of(model, history.event[e, MEMBER])
-    return -history.kept[e, TIME_BY_SET] * sets[slot, i] if slot >= 0 else 0.0
+    if slot >= 0:
+        for i in range(later.shape[0]):
+            later[i] -= history.kept[e, TIME_BY_SET] * sets[slot, i]
 
 
 @kernel
@@ -434,67 +435,32 @@ def keep_start(model, history, lam_q, lam_v, bar, start, out):
 
 
 @kernel
-def sets_forward(model, history, e, column, sets):
+def sets_forward(model, history, e, row_of, states, sets):
     """Carry the derivatives of the permanent sets over event e, if it has made one.
 
-    column (M_padded + P, 4 n + 1): derivatives of q, v and the rest of the state, a row each variable
+    model: the compiled scene.
+    history, e: the history of steps (`StepHistory`), and number of the event.
+    row_of (n,): which row of `states` has a coordinate, -1 where none has.
+    states (W + 1, M_padded + P): derivatives of q, v and the rest of the state, a column each variable
       (`direct.through_step`).
     sets (slots, M_padded + P): derivatives of the sets; the row of the set that was made is written.
     """
-    slot, k = made_set(model, history, e)
+    slot, block = made_set(model, history, e)
     if slot < 0:
         return
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
     s = history.event[e, STATE]
-    p = model.block[k, PAIR]
+    p = model.block[block, PAIR]
     _, rate = member_rows(model, p, history.event[e, MEMBER], history.q[s], history.v[s], row, row_rate)
-    for i in range(column.shape[0]):
+    for i in range(sets.shape[1]):
         sets[slot, i] = 0.0
         for r in range(pair_freedoms(model)):
-            sets[slot, i] += row[r] * column[i, place_in_pair(model, model.block[k, PAIR], r)]
+            k = row_of[place_in_pair(model, p, r)]
+            if k >= 0:
+                sets[slot, i] += row[r] * states[k, i]
     for entry in range(model.varied.shape[0]):
         if varies_member(model, entry, history.event[e, MEMBER]):
             sets[slot, model.member.shape[1] + model.varied[entry, VARIED_VALUE]] += own_slope(
                 model, history, e, entry, rate
             )
-
-
-@kernel
-def through_sets(model, member_state, history, w, matrix, out):
-    """What unit changes of the permanent sets do to the end of a step.
-
-    Constant:
-      model: the compiled scene.
-      history: the history of steps (`StepHistory`).
-    In:
-      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      w: number of the step.
-      matrix (4 n + s n, 4 n + 1): the map of the step (`direct.step_map`).
-    Out:
-      out (slots, 4 n + 1): changes of q, v, the carried rows and the integral, per m of set.
-    """
-    n = model.mass.shape[0]
-    segment = history.index[w, SEGMENT]
-    o = history.index[w, FIRST]
-    row = np.empty(pair_freedoms(model))
-    row_rate = np.empty(pair_freedoms(model))
-    slot = 0
-    for k in range(model.block.shape[0]):
-        if not law_remembers(model.block[k, CODE]):
-            continue
-        p = model.block[k, PAIR]
-        lo = model.block[k, START]
-        for i in range(lo, lo + model.block[k, COUNT]):
-            out[slot] = 0.0
-            if model.active[segment, k] != 0:
-                for j in range(history.index[w + 1, FIRST] - o):
-                    x, rate = member_rows(model, p, i, history.stage_q[o + j], history.stage_v[o + j], row, row_rate)
-                    force, _ = set_slopes(model, k, i, member_state, x - member_state[SET, i], rate)
-                    if force == 0.0:
-                        continue
-                    for r in range(pair_freedoms(model)):
-                        b = (4 + j) * n + place_in_pair(model, p, r)
-                        for d in range(out.shape[1]):
-                            out[slot, d] -= force * row[r] * matrix[b, d]
-            slot += 1

@@ -19,9 +19,10 @@ from mdstopo.general.accelerations import (
     joint_state,
     matrices_vjp,
     solve_unknowns,
+    subtract_matrices,
 )
 from mdstopo.general.general_model import JOINT_FIRST, JOINT_PAIR, JOINT_ROWS
-from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
+from mdstopo.general.strides import pair_freedoms, place_in_joint
 from mdstopo.general.switches import DIAGONAL
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_shift_curvature,
@@ -297,7 +298,7 @@ def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
 
 @kernel
 def project_forward(model, q, v, mu, nu, workspace, dq, dv):
-    """Push changes of a state through its projection.
+    """Push R changes of a state through its projection.
 
     Constant:
       model: the compiled scene.
@@ -305,7 +306,7 @@ def project_forward(model, q, v, mu, nu, workspace, dq, dv):
       q, v (n,): the projected state (m, rad; m/s, rad/s).
       mu, nu (n_row,): multipliers that moved it there.
     In place:
-      dq, dv (n,): changes of coordinates and velocities, before and then behind the projection.
+      dq, dv (R, n): changes of coordinates and velocities, before and then behind the projection.
     Out:
       workspace: workspace of a balance (`accelerations.Workspace`).
     """
@@ -316,7 +317,7 @@ def project_forward(model, q, v, mu, nu, workspace, dq, dv):
     h_mu = np.empty((n_pair, pair_freedoms(model), pair_freedoms(model)))
     h_nu = np.empty((n_pair, pair_freedoms(model), pair_freedoms(model)))
     slope = np.zeros((model.joint.shape[0], most_rows(model), pair_freedoms(model)))
-    y = np.zeros(mu.shape[0])
+    y = np.zeros((dq.shape[0], mu.shape[0]))
     none = np.zeros((n_pair, pair_freedoms(model), pair_freedoms(model)))
     turn = np.zeros((n, load_slopes(model)))
     turn_bodies(model, q, workspace.turned)
@@ -326,24 +327,21 @@ def project_forward(model, q, v, mu, nu, workspace, dq, dv):
     workspace.by_q[:] = 0.0
     workspace.by_v[:] = 0.0
     factor_matrix(model, workspace, h_mu, none, turn, none, 1.0, 0.0, workspace.tangents[NO_SHIFT], np.bool_(False))
-    turn_back(model, shift, np.bool_(False), dq)
-    for d in range(n):
-        dq[d] *= model.mass[d]
-        dv[d] *= model.mass[d]
-    solve_unknowns(model, workspace, dq, y)
-    for p in range(n_pair):
-        for i in range(pair_freedoms(model)):
-            value = 0.0
-            for j in range(pair_freedoms(model)):
-                value += h_nu[p, i, j] * dq[place_in_pair(model, p, j)]
-            dv[place_in_pair(model, p, i)] -= value
-    for j in range(model.joint.shape[0]):
-        for r in range(most_rows(model)):
-            own = model.row[j, r]
-            if own >= 0:
-                value = 0.0
-                for i in range(pair_freedoms(model)):
-                    value -= slope[j, r, i] * dq[place_in_joint(model, j, i)]
-                y[own] = value
+    for m in range(dq.shape[0]):
+        turn_back(model, shift, np.bool_(False), dq[m])
+        for d in range(n):
+            dq[m, d] *= model.mass[d]
+            dv[m, d] *= model.mass[d]
+        solve_unknowns(model, workspace, dq[m], y[m])
     factor_matrix(model, workspace, none, none, turn, none, 0.0, 0.0, workspace.tangents[NO_SHIFT], np.bool_(False))
-    solve_unknowns(model, workspace, dv, y)
+    for m in range(dq.shape[0]):
+        subtract_matrices(model, h_nu, dq[m], dv[m])
+        for j in range(model.joint.shape[0]):
+            for r in range(most_rows(model)):
+                own = model.row[j, r]
+                if own >= 0:
+                    value = 0.0
+                    for i in range(pair_freedoms(model)):
+                        value -= slope[j, r, i] * dq[m, place_in_joint(model, j, i)]
+                    y[m, own] = value
+        solve_unknowns(model, workspace, dv[m], y[m])

@@ -8,6 +8,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import lanes
+from mdstopo.general.balance_slopes import add_numbers_of_rows
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.general_model import (
     CODE,
@@ -24,7 +25,6 @@ from mdstopo.general.general_model import (
 )
 from mdstopo.general.members import SCALE, level_of, rate_of_row
 from mdstopo.general.parameters import parameter_slopes
-from mdstopo.general.scene_numbers import add_numbers_of_rows
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
 from mdstopo.general.switches import carriers
@@ -60,54 +60,88 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
       work (WORK,): counts of work, added to.
     """
     count = z.shape[0]
-    n_pair = model.pair.shape[0]
     work[DESIGN_STATES] += stages * count
-    rel = np.empty((stages, n_pair, pose_size(model)))
-    u = np.empty((count, stages, n_pair, freedoms(model)))
-    turned = np.empty((model.home.shape[0], attitude(model)))
+    rel = np.empty((stages, model.pair.shape[0], pose_size(model)))
+    u = np.empty((count, stages, model.pair.shape[0], freedoms(model)))
     carries = carriers(model)
+    poses_of_stages(model, history, o, carries, rel)
     for j in range(stages):
-        q = history.stage_q[o + j]
-        if has_factors(history):
-            copy_rows(history.turned[o + j], turned)
-        else:
-            turn_bodies(model, q, turned)
-        for p in range(n_pair):
+        for p in range(model.pair.shape[0]):
             if carries[p] != 0:
-                turned_pose(model, p, turned, q, history.stage_v[o + j], rel[j])
                 for m in range(count):
                     pair_displacement(model, rel[j], p, z[m, j], u[m, j, p])
                     for i in range(freedoms(model)):
                         u[m, j, p, i] = -u[m, j, p, i]
-    room = np.empty(4 * stages * lanes())
-    longest = 0
+    add_members_of_rows(model, segment, history, o, member_state, rel, u, out)
     for k in range(model.block.shape[0]):
-        longest = max(longest, model.block[k, COUNT])
-    seen = np.empty((freedoms(model) + 2, longest))
-    for k in range(model.block.shape[0]):
-        if model.block[k, DESIGN] < 0 or model.active[segment, k] == 0:
-            continue
-        p = model.block[k, PAIR]
-        lo = model.block[k, START]
-        if model.block[k, CODE] == SPRING:
-            spring_designs_of_rows(model, model.law[k], lo, model.block[k, COUNT], rel, u, p, room, out)
-            continue
-        for j in range(stages):
-            if model.block[k, CODE] == INERTER:
+        if model.block[k, CODE] == INERTER and model.block[k, DESIGN] >= 0 and model.active[segment, k] != 0:
+            for j in range(stages):
                 _add_inerters(model, k, history, o + j, z, j, out)
-            else:
-                t = history.when[o + j]
-                level = level_of(model, segment, k, t)
-                member_designs_of_rows(
-                    model, model.block[k, CODE], model.law[k], lo, model.block[k, COUNT], t, level, member_state,
-                    rel[j, p], u, j, p, seen, out,
-                )  # fmt: skip
     if model.varied.shape[0] > 0:
         for j in range(stages):
             _add_parameters(model, segment, history, o + j, member_state, z, j, out)
     if model.apart.shape[0] > 0:
         for j in range(stages):
             add_numbers_of_rows(model, segment, history, o + j, z, j, out)
+
+
+@kernel
+def poses_of_stages(model, history, o, carries, rel):
+    """Relative poses of the pairs that carry more than joints, at the stages of a step from number o on.
+
+    model: the compiled scene. history, o: the history of steps, and the number of the first stage.
+    carries (n_pair,): of `switches.carriers`.
+    rel (stages, n_pair, POSE): out.
+    """
+    turned = np.empty((model.home.shape[0], attitude(model)))
+    for j in range(rel.shape[0]):
+        q = history.stage_q[o + j]
+        if has_factors(history):
+            copy_rows(history.turned[o + j], turned)
+        else:
+            turn_bodies(model, q, turned)
+        for p in range(model.pair.shape[0]):
+            if carries[p] != 0:
+                turned_pose(model, p, turned, q, history.stage_v[o + j], rel[j])
+
+
+@kernel
+def add_members_of_rows(model, segment, history, o, member_state, rel, u, out):
+    """Add the derivatives by alpha^mu of all design members but inerters at the stages of one step: sum f (b . u).
+
+    Constant:
+      model: the compiled scene.
+      history: the history of steps (`StepHistory`).
+    In:
+      segment, o: number of the stretch of time between two breakpoints, and of the first stage.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      rel (S, n_pair, POSE): relative poses at the stages.
+      u (R, S or more, n_pair, D): virtual changes of these for each row, with their signs turned.
+    Out:
+      out (R, M_padded or more): derivatives by alpha^mu of each row, added to.
+    """
+    stages = rel.shape[0]
+    room = np.empty(4 * stages * lanes())
+    longest = 0
+    for k in range(model.block.shape[0]):
+        longest = max(longest, model.block[k, COUNT])
+    seen = np.empty((freedoms(model) + 2, longest))
+    for k in range(model.block.shape[0]):
+        code = model.block[k, CODE]
+        if model.block[k, DESIGN] < 0 or model.active[segment, k] == 0 or code == INERTER:
+            continue
+        p = model.block[k, PAIR]
+        lo = model.block[k, START]
+        if code == SPRING:
+            spring_designs_of_rows(model, model.law[k], lo, model.block[k, COUNT], rel, u, p, room, out)
+            continue
+        for j in range(stages):
+            t = history.when[o + j]
+            level = level_of(model, segment, k, t)
+            member_designs_of_rows(
+                model, code, model.law[k], lo, model.block[k, COUNT], t, level, member_state, rel[j, p], u, j, p, seen,
+                out,
+            )  # fmt: skip
 
 
 @kernel

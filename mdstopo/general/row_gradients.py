@@ -16,7 +16,7 @@ BLOCK = 2**23
 KEPT = 32
 
 
-class _Block(NamedTuple):
+class Block(NamedTuple):
     """Rows of one reverse sweep: what `row_sweep.rows_vjp` takes, by its names."""
 
     which: IndexArray
@@ -67,7 +67,7 @@ class RowGradients:
 
     def __init__(self, driver: "GeneralDriver") -> None:
         self._driver = driver
-        self._blocks: dict[int, _Block] = {}
+        self._blocks: dict[int, Block] = {}
 
     def __call__(self, count: int, across: FloatArray | None) -> None:
         """Fill the driver's `gradients`, for a motion of so many steps; what is across of norms, too, where there is an
@@ -78,7 +78,7 @@ class RowGradients:
         most = max(1, BLOCK // max(1, len(driver.padded)))
         for first in range(0, len(wanted), most):
             part = wanted[first : first + most]
-            block = self._block(len(part))
+            block = self.block(len(part))
             for m, (j, _, is_across, _, row) in enumerate(part):
                 block.which[m] = j, is_across
                 block.rows[m] = row
@@ -103,9 +103,9 @@ class RowGradients:
 
     def compile(self) -> None:
         """Compile what computes the gradients, without computing any."""
-        self._driver.entry.rows_vjp.compile(*self._arguments(0, self._block(1)))
+        self._driver.entry.rows_vjp.compile(*self._arguments(0, self.block(1)))
 
-    def _arguments(self, count: int, block: _Block) -> tuple[Any, ...]:
+    def _arguments(self, count: int, block: Block) -> tuple[Any, ...]:
         """What the compiled sweep takes."""
         driver = self._driver
         return (
@@ -113,12 +113,12 @@ class RowGradients:
             driver.member_state, block.padded, block.out, block.starts, driver.work,
         )  # fmt: skip
 
-    def _block(self, count: int) -> _Block:
+    def block(self, count: int) -> Block:
         """Arrays for so many rows at once; those of few rows are kept."""
         if count in self._blocks:
             return self._blocks[count]
         driver = self._driver
-        block = _Block(
+        block = Block(
             np.zeros((count, 2), dtype=np.int64),
             np.zeros((count, COLUMNS)),
             np.zeros((count, len(driver.padded))),

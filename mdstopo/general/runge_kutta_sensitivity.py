@@ -71,6 +71,12 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
 
 
 @kernel
+def carried(tag):
+    """A step takes nothing over but the state."""
+    return 0
+
+
+@kernel
 def state_at_offset(tag, model, history, k, c, e, q, v, a, q_out, v_out):
     """The state a little later, on a parabola with the accelerations at c; see `method_interface.state_at_offset`.
 
@@ -107,6 +113,7 @@ COMMON: dict[str, Any] = {
     "step_back": step_back,
     "step_forward": step_forward,
     "state_at_offset": state_at_offset,
+    "carried": carried,
     "derivatives": derivatives,
     "is_continuous": is_continuous,
     "weights_of": weights_of,

@@ -4,13 +4,13 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import joint_slopes, joint_state, make_workspace
-from mdstopo.general.direct import own_force
 from mdstopo.general.forces import general_forces
 from mdstopo.general.general_model import (
     CODE,
     COUNT,
     DESIGN,
     INERTER,
+    MEMBER_FREE_LENGTH,
     PAIR,
     START,
     VARIED_BLOCK,
@@ -20,18 +20,19 @@ from mdstopo.general.general_model import (
     VARIED_VALUE,
     unpack_general,
 )
-from mdstopo.general.members import SCALE, scale_general, set_modes
+from mdstopo.general.members import MODE, SCALE, SET, level_of, scale_general, set_modes
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair, place_of_turn
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     drive_state,
     freedoms,
+    member_rows,
     most_rows,
     pose_size,
     relative_pose,
     rotations,
 )
-from mdstopo.mechanics.laws.law_table import FREE_LENGTH
+from mdstopo.mechanics.laws.law_table import FREE_LENGTH, law
 
 
 @kernel
@@ -94,6 +95,29 @@ def statics(ints, floats, alpha, member_state, q, lam, force, stiffness, rows, p
                     rows[own, place_in_joint(model, j, i)] += workspace.jac[j, r, i]
 
 
+@kernel
+def _own_force(model, k, i, member_state, q, v, row, row_rate):
+    """The force f_i of a member at unit strength (N), no inerter, and its row B_i.
+
+    Constant:
+      model: the compiled scene.
+      k, i: the block, and the member (padded).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q (n_q,), v (n,): coordinates, velocities.
+    Out:
+      row (2 D,): B_i over the freedoms of both bodies. row_rate (2 D,): its derivative by time.
+    """
+    x, rate = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
+    x -= member_state[SET, i]
+    t = model.times[0]
+    value = level_of(model, np.int64(0), k, t)
+    f, _, _, _, _ = law(
+        model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), t, value, model.curves,
+        model.member[MEMBER_FREE_LENGTH, i],
+    )  # fmt: skip
+    return f
+
+
 @entry
 def unit_forces(ints, floats, alpha, member_state, q, out):
     """The slopes of the forces at rest by alpha^mu of each design member: -f_i B_i^T.
@@ -121,7 +145,7 @@ def unit_forces(ints, floats, alpha, member_state, q, out):
             continue
         p = model.block[k, PAIR]
         for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
-            f = own_force(model, k, i, np.int64(0), model.times[0], member_state, q, v, v, row, row_rate)
+            f = _own_force(model, k, i, member_state, q, v, row, row_rate)
             for r in range(pair_freedoms(model)):
                 out[i, place_in_pair(model, p, r)] -= f * row[r]
 

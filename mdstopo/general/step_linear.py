@@ -63,35 +63,6 @@ def lay_out(model, history, o, workspace):
 
 
 @kernel
-def solve_stage(model, history, o, w_q, w_v, transposed, workspace, a, lam):
-    """Solve with W(w_q, w_v) of a stage, or with its transpose.
-
-    Where factors are kept, weights are 0 and the matrix is symmetric.
-
-    Constant:
-      model: the compiled scene.
-      history: the history of steps (`StepHistory`).
-    In:
-      o: number of the stage, which is laid out in the workspace (`lay_out`).
-      w_q, w_v: weights of the stiffness (s^2) and the damping (s).
-      transposed: whether the transpose is meant.
-    In place:
-      workspace: workspace of a balance (`accelerations.Workspace`).
-      a (n,), lam (n_row,): the right side, then the solution; driven parts become 0.
-    """
-    if has_factors(history):
-        solve_joints(
-            model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, a, lam
-        )
-        return
-    factor_matrix(
-        model, workspace, history.K[o], history.C[o], history.turn[o], mass_of(history, o), w_q, w_v,
-        workspace.tangents[OF_STEP], transposed,
-    )  # fmt: skip
-    solve_unknowns(model, workspace, a, lam)
-
-
-@kernel
 def prepare_stage_back(model, history, o, w_q, w_v, workspace):
     """Prepare a stage for `stage_back`: once for any number of rows.
 
@@ -243,7 +214,7 @@ def _runge_kutta_stage_back(
 
 @kernel
 def changes_forward(tag, model, tables, history, w, dq, dv, force, stage_changes, row_changes, workspace):
-    """Push changes of the start of a Runge-Kutta step, and of the forces at its stages, to its end.
+    """Push R changes of the start of a Runge-Kutta step, and of the forces at its stages, to its end.
 
     Constant:
       tag: the method of integration (`method_interface`).
@@ -252,53 +223,128 @@ def changes_forward(tag, model, tables, history, w, dq, dv, force, stage_changes
       history: the history of steps (`StepHistory`).
     In:
       w: number of the step.
-      force (s, n): changes of the forces at the stages (N, N m).
+      force (R, s or more, n): changes of the forces at the stages (N, N m).
     In place:
-      dq, dv (n,): changes of coordinates and velocities.
+      dq, dv (R, n): changes of coordinates and velocities.
     Out:
-      stage_changes (s, 3, n): of the stages' coordinates, velocities, accelerations.
-      row_changes (s, n_row): of their multipliers.
+      stage_changes (R, s or more, 3, n): of the stages' coordinates, velocities, accelerations.
+      row_changes (R, s or more, n_row): of their multipliers.
       workspace: workspace of a balance (`accelerations.Workspace`).
     """
-    n = dq.shape[0]
+    count = dq.shape[0]
     table, s = table_of_step(tag, model, tables, history, w)
     o = history.index[w, FIRST]
     h = history.t[w + 1] - history.t[w]
     q = history.stage_q[o : o + s]
     v = history.stage_v[o : o + s]
+    unmoved = np.empty(count, np.bool_)  # where nothing has changed up to the stage in hand
+    for m in range(count):
+        unmoved[m] = is_zero(dq[m]) and is_zero(dv[m])
     for i in range(s):
-        x = stage_changes[i]
-        stage_jvp(model, table, h, i, q, v, dq, dv, stage_changes)
-        for d in range(n):
-            if model.free[d] == 0:
-                x[0, d] = 0.0
-                x[1, d] = 0.0
-            x[2, d] = force[i, d]
-        row_changes[i] = 0.0
         w_q, w_v = own_weights(tag, table, i, h)
-        stage_forward(model, history, o + i, w_q, w_v, 0, workspace, x[0], x[1], x[2], row_changes[i])
-        if not is_explicit(tag):
-            for d in range(n):
-                x[0, d] += w_q * x[2, d]
-                x[1, d] += w_v * x[2, d]
-    end_jvp(model, table, s, h, q, v, stage_changes, dq, dv)
-    for d in range(n):
-        if model.free[d] == 0:
-            dq[d] = 0.0
-            dv[d] = 0.0
+        k, c = prepare_stage_forward(model, history, o + i, w_q, w_v, 0, workspace)
+        for m in range(count):
+            unmoved[m] = unmoved[m] and is_zero(force[m, i])
+            if unmoved[m]:
+                stage_changes[m, i] = 0.0
+                row_changes[m, i] = 0.0
+                continue
+            _runge_kutta_stage_forward(
+                tag, model, table, history, o, i, h, q, v, k, c, dq[m], dv[m], force[m, i], stage_changes[m],
+                row_changes[m, i], workspace,
+            )  # fmt: skip
+    for m in range(count):
+        end_jvp(model, table, s, h, q, v, stage_changes[m], dq[m], dv[m])
+        keep_free(model, dq[m])
+        keep_free(model, dv[m])
     push = history.push[w + 1]
     project_forward(model, history.q[w + 1], history.v[w + 1], push[0], push[1], workspace, dq, dv)
 
 
+@part
+def _runge_kutta_stage_forward(
+    tag, model, table, history, o, i, h, q, v, k, c, dq, dv, force, changes, row, workspace
+):  # fmt: skip
+    """One stage of `changes_forward`, which is prepared, for one of the R changes.
+
+    Constant:
+      tag: the method of integration (`method_interface`).
+      model: the compiled scene.
+      table (3, 17, 17): coefficients of the method.
+      history: the history of steps (`StepHistory`).
+    In:
+      o, i: number of the step's first stage, and of this one counted from it.
+      h: length of the step (s).
+      q (s, n_q), v (s, n): coordinates and velocities of its stages.
+      k, c (n_pair, 2 D, 2 D): of `prepare_stage_forward`.
+      dq, dv, force (n,): changes of the start's coordinates and velocities, and of the forces at this stage.
+      workspace: workspace of a balance, with what was prepared.
+    Out:
+      changes (s or more, 3, n): changes[i] of this stage; those of the stages before are read.
+      row (n_row,): changes of the multipliers.
+    """
+    x = changes[i]
+    stage_jvp(model, table, h, i, q, v, dq, dv, changes)
+    keep_free(model, x[0])
+    keep_free(model, x[1])
+    for d in range(force.shape[0]):
+        x[2, d] = force[d]
+    row[:] = 0.0
+    w_q, w_v = own_weights(tag, table, i, h)
+    stage_forward(model, history, o + i, k, c, w_q, w_v, 0, workspace, x[0], x[1], x[2], row)
+    if not is_explicit(tag):
+        for d in range(force.shape[0]):
+            x[0, d] += w_q * x[2, d]
+            x[1, d] += w_v * x[2, d]
+
+
+@part
+def is_zero(x):
+    """Whether x (n,) is zero throughout."""
+    zero = True
+    for d in range(x.shape[0]):
+        zero = zero and x[d] == 0.0
+    return zero
+
+
+@part
+def keep_free(model, x):
+    """Make x (n,) zero where a freedom is no unknown."""
+    for d in range(x.shape[0]):
+        if model.free[d] == 0:
+            x[d] = 0.0
+
+
 @kernel
-def stage_forward(model, history, o, w_q, w_v, sweeps, workspace, dq, dv, force, row):
+def prepare_stage_forward(model, history, o, w_q, w_v, sweeps, workspace):
+    """Prepare a stage for `stage_forward`: once for any number of changes. Returns its K and C.
+
+    model: the compiled scene.
+    history: the history of steps (`StepHistory`).
+    o: number of the stage.
+    w_q, w_v, sweeps: as of `stage_forward`.
+    workspace: workspace of a balance, which takes what is prepared.
+    """
+    k, c = lay_out(model, history, o, workspace)
+    if not has_factors(history):
+        of_matrix = 0.0 if sweeps > 0 else 1.0  # sweeps account for the stage's own accelerations
+        factor_matrix(
+            model, workspace, k, c, history.turn[o], mass_of(history, o), of_matrix * w_q, of_matrix * w_v,
+            workspace.tangents[OF_STEP if sweeps == 0 else NO_SHIFT], np.bool_(False),
+        )  # fmt: skip
+    return k, c
+
+
+@kernel
+def stage_forward(model, history, o, k, c, w_q, w_v, sweeps, workspace, dq, dv, force, row):
     """Changes of a stage's accelerations and multipliers from those of its state and of the forces on it.
 
     Constant:
       model: the compiled scene.
       history: the history of steps (`StepHistory`).
     In:
-      o: number of the stage.
+      o: number of the stage, the one that was prepared last (`prepare_stage_forward`).
+      k, c (n_pair, 2 D, 2 D): its K and C.
       w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
       sweeps: 0 where the matrix W accounts for that; else so many fixed-point sweeps at most (the iterative method) do,
         until they change by less than SETTLED.
@@ -306,16 +352,19 @@ def stage_forward(model, history, o, w_q, w_v, sweeps, workspace, dq, dv, force,
     In place:
       force (n,): changes of the forces, then of the accelerations.
       row (n_row,): changes of the right side of the rows, then of the multipliers.
-    Out:
-      workspace: workspace of a balance (`accelerations.Workspace`).
+      workspace: workspace of a balance, with what was prepared.
 
     Returns whether the sweeps have settled; True without any.
     """
-    k, c = lay_out(model, history, o, workspace)
     accelerations_jvp(model, workspace, k, c, history.turn[o], dq, dv, force, row)
     if sweeps > 0 and (w_q != 0.0 or w_v != 0.0):
         return _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row)
-    solve_stage(model, history, o, w_q, w_v, np.bool_(False), workspace, force, row)
+    if has_factors(history):
+        solve_joints(
+            model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, force, row
+        )
+    else:
+        solve_unknowns(model, workspace, force, row)
     return True
 
 
@@ -327,7 +376,7 @@ def _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row):
       model: the compiled scene.
       history: the history of steps (`StepHistory`).
     In:
-      o: number of the stage, which is laid out in the workspace (`lay_out`).
+      o: number of the stage, which is prepared (`prepare_stage_forward`).
       w_q, w_v: weights of the stiffness (s^2) and the damping (s).
       sweeps: how many at most.
     In place:
@@ -338,11 +387,6 @@ def _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row):
     """
     n = force.shape[0]
     n_row = row.shape[0]
-    none = history.K[o]
-    factor_matrix(
-        model, workspace, none, none, history.turn[o], mass_of(history, o), 0.0, 0.0,
-        workspace.tangents[NO_SHIFT], np.bool_(False),
-    )  # fmt: skip
     x = np.zeros(n)
     y = np.zeros(n_row)
     dq = np.empty(n)

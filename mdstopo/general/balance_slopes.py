@@ -16,7 +16,6 @@ import numpy as np
 
 from mdstopo.compiler.jit import by_type, kernel
 from mdstopo.general.general_model import planar_twin, spatial_twin
-from mdstopo.general.step_history import FIRST
 from mdstopo.mechanics.kinematics.kinematics_interface import add_loads
 
 _TWINS = {"PlanarView": planar_twin, "SpatialView": spatial_twin}
@@ -132,40 +131,16 @@ def add_start_velocities(model, lam_v, out):
 
 
 @kernel
-def begin_velocities(model, column):
-    """Put the derivatives of the start velocities into column (M_padded + P, 4 n + 1) of `direct`."""
-    n = model.mass.shape[0]
+def begin_velocities(model, place, states):
+    """Put the derivatives of the velocities at the start into states (W + 1, M_padded + P) of `direct`.
+
+    place (F,): the free freedoms.
+    """
+    free = place.shape[0]
     count = model.apart.shape[0]
     for b in range(count):
         one = twin_of(model, b, 0)
         other = twin_of(model, b, 1)
-        for d in range(n):
-            column[column.shape[0] - count + b, n + d] = (one.v0[d] - other.v0[d]) / model.apart[b]
-
-
-@kernel
-def number_through_step(model, b, history, w, segment, matrix, spare):
-    """Add the derivative of the state at the end of step w by number b that comes from the forces at its stages.
-
-    Constant:
-      model: the compiled scene. b: the number; below 0 it is none of these.
-      history, w: the history of steps, and the step.
-      segment: segment of `model.times` in which it lies.
-      matrix (4 n + s n or more, 4 n + 1): of `direct.step_map`.
-    Out:
-      spare (4 n + 1,): added to.
-    """
-    if b < 0:
-        return
-    n = model.mass.shape[0]
-    f = np.empty(n)
-    slope = np.empty(n)
-    o = history.index[w, FIRST]
-    for j in range(history.index[w + 1, FIRST] - o):
-        number_slope(
-            model, b, segment, history.when[o + j], history.stage_q[o + j], history.stage_v[o + j],
-            history.stage_a[o + j], f, slope,
-        )  # fmt: skip
-        for d in range(n):
-            for e in range(spare.shape[0]):
-                spare[e] -= slope[d] * matrix[(4 + j) * n + d, e]
+        for k in range(free):
+            slope = (one.v0[place[k]] - other.v0[place[k]]) / model.apart[b]
+            states[free + k, states.shape[1] - count + b] = slope

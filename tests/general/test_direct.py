@@ -1,0 +1,69 @@
+"""Sensitivities carried forward: the map of a step, and many rows in one sweep."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mdstopo
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+
+from .support import design_of, load
+
+CASE = """
+format: 1
+gravity: [0, -9.8]
+time: {end: 0.3}
+bodies:
+  torso: {mass: 60, inertia: 10, position: [0, 0], velocity: [0.1, 0], angular_velocity: 0.2}
+  vehicle: {mass: 2000, inertia: 6000, position: [0, -1], angle: 0.1}
+points:
+  a: {body: torso, grid: {rectangle: {center: [0, 0], size: [0.5, 0.5], count: 5}}}
+  b: {body: vehicle, grid: {line: {from: [-1, -0.8], to: [1, -0.8], count: 4}}}
+members:
+  belts: {from: a, to: b, law: {type: spring, stiffness: 900, damping: 30, preload: 5}}
+  ties: {from: {body: ground, at: [0, 1]}, to: a, law: {type: spring, stiffness: 300}, design: TIES}
+loads:
+  - {body: vehicle, acceleration: {table: [[0, 9.8, 0], [0.1, 4, 2], [0.3, 0, 0]]}, angular_acceleration: 20}
+  - {body: torso, force: [30, 10], at: [0.1, 0.2], frame: body}
+design: {initial: 0.4, power: 1.5}
+objectives:
+  G: {response: energy, over_time: max}
+  M: {response: energy, over_time: mean}
+combine: {weights: {G: 1, M: 1}}
+"""
+#: what is pushed through a step: forces on the one pair with design members (3, fewer than 6 freedoms), or on bodies
+UNITS = {"of pairs": "false", "of bodies": "true"}
+
+
+@pytest.mark.parametrize("integrator", ["gauss", "runge_kutta", "generalized_alpha"])
+@pytest.mark.parametrize("units", UNITS)
+def test_general_kernels_have_the_gradients_of_those_of_springs(units, integrator):
+    case = read_case(CASE.replace("TIES", UNITS[units]), overrides={"solver.integrator": integrator})
+    if integrator == "generalized_alpha":
+        case = replace(case, solver=replace(case.solver, step=0.005))
+    else:
+        case = replace(case, solver=replace(case.solver, tolerance=1e-11))
+    springs, general = (Evaluator(case, beyond=beyond) for beyond in ("", "a comparison"))
+    own, found = (each.evaluate(case.initial, sensitivity="direct") for each in (springs, general))
+    assert springs.beyond == ""
+    adjoint = general.evaluate(case.initial)
+    for name, gradient in own.gradients.items():
+        size = np.abs(gradient).max()
+        assert found.objectives[name] == pytest.approx(own.objectives[name], rel=1e-9)
+        assert np.abs(found.gradients[name] - gradient).max() <= 1e-8 * size, name
+        assert np.abs(found.gradients[name] - adjoint.gradients[name]).max() <= 1e-12 * size, name
+
+
+@pytest.mark.parametrize("integrator", ["runge_kutta", "generalized_alpha"])
+def test_rows_that_are_carried_together_have_the_gradients_of_each_alone(integrator):
+    step = {"step": 0.005} if integrator == "generalized_alpha" else {}
+    case = load("loaded_pendulum", integrator=integrator, **step)
+    alpha = design_of(case)
+    together = mdstopo.evaluate(case, alpha, method="direct")
+    assert len(together.gradients) > 3
+    whole = Evaluator(case)
+    for name, gradient in together.gradients.items():
+        alone = whole.looking_at([name]).evaluate(alpha, sensitivity="direct")
+        assert np.abs(alone.gradients[name] - gradient).max() <= 1e-11 * np.abs(gradient).max(), name
