@@ -117,7 +117,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "space/test_half_turns_looked_at.py": ("without_an_error_estimate",),
     "space/test_implicit_steps.py": ("",),
     "space/test_law_parameters.py": ("",),
-    "space/test_movable_in_space.py": ("slopes[all",),
+    "space/test_movable_in_space.py": ("slopes[all", "points[some"),
     "space/test_names_in_space.py": ("",),
     "space/test_orders_in_space.py": ("[gauss",),
     "space/test_windows.py": ("",),
