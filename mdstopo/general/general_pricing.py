@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 HIGHEST, MANY = 3, 8
 #: the largest error of a price in a pass where laws switch, relative to the largest price: prices of these are
 #: accurate to the steps alone
-SWITCHING_ERROR = 1e-9
+SWITCHING_ERROR = 1e-8
 
 
 class ScenePricingStates(NamedTuple):
