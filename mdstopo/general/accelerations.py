@@ -383,6 +383,8 @@ def apply_mass(model, workspace, x, out):
     """
     for d in range(x.shape[0]):
         out[d] = model.mass[d] * x[d]
+    if workspace.switches[DIAGONAL] != 0:
+        return
     for p in range(model.pair.shape[0]):
         for i in range(pair_freedoms(model)):
             total = 0.0

@@ -24,7 +24,7 @@ from mdstopo.general.first_step import first_step, motion_scale
 from mdstopo.general.landing import CORRECTIONS, first_event, landing_of
 from mdstopo.general.locate import AIM, NEAREST, is_sharp, step_beside_sharp, time_to_sharp, time_to_switch
 from mdstopo.general.locate import NEAR as NEAR_SWITCH
-from mdstopo.general.members import MODE, SET, meeting, scale_general
+from mdstopo.general.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
 from mdstopo.general.method_interface import UNSOLVED, is_explicit, make_stages, scheme, step_error
 from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.projection import project
@@ -311,6 +311,8 @@ def run_adaptive(
     noise = np.empty(n_pair)
     scale = np.empty(n_pair)
     motion_at_start(model, member_state, workspace, rel0, v0, scale, motion, noise)
+    shortest = np.empty(n_pair)
+    shortest_at_start(model, rel0, shortest)
     shaken = 0.0
     for p in range(n_pair):
         shaken += abs(scale[p]) * noise[p]
@@ -521,7 +523,7 @@ def run_adaptive(
             must = True
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(model, rel, rel0, p))
-            if where[1] < 0:
+            if where[1] < 0 and may_meet(shortest, motion):
                 relative_pose(model, q0, v0, before)
                 where[1] = meeting(model, segment, t, member_state, before, rel)
             happened = events

@@ -30,7 +30,7 @@ from mdstopo.general.gauss_window import (
 from mdstopo.general.general_model import KIND, unpack_general
 from mdstopo.general.general_responses import ENERGY
 from mdstopo.general.generalized_alpha_step import rate_of
-from mdstopo.general.members import MODE, SET, meeting, scale_general, shortest_at_home
+from mdstopo.general.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
 from mdstopo.general.run_start import motion_at_start
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, copy_vector, keep_state
 from mdstopo.integrators.driver import LOOSE_NEWTON, NEWTON_TOLERANCE
@@ -296,7 +296,7 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     balanced = is_steady(model, np.int64(0))  # whether node 0 has the balance that the next prediction begins with
     motion_at_start(model, member_state, workspace, rel0, v0, scale, motion, noise)
     shortest = np.empty(n_pair)
-    _shortest_at_start(model, rel0, shortest)
+    shortest_at_start(model, rel0, shortest)
     last_time = times[times.shape[0] - 1]
     span = last_time - t
     wanted = fixed_step
@@ -350,7 +350,7 @@ def windows(model, tables, member_state, settings, most, history, work, where):
             relative_pose(model, q0, v0, after)
             for p in range(n_pair):
                 motion[p] = max(motion[p], nodes.reached[p], deflection(model, after, rel0, p))
-            if where[1] < 0 and _may_meet(shortest, motion):
+            if where[1] < 0 and may_meet(shortest, motion):
                 where[1] = _meeting(model, segment, t, member_state, s, before, after, nodes)
             copy_vector(after.reshape(after.size), before.reshape(before.size))
             t = stop if lands else t + h
@@ -387,24 +387,6 @@ def _end_of_window(model, planes, s, h, nodes, end):
         end[1, d] = y
         finite = finite and np.isfinite(x) and np.isfinite(y)
     return finite
-
-
-@kernel
-def _shortest_at_start(model, rel0, shortest):
-    """shortest (n_pair,) = at most the length of each pair's shortest member at the relative poses rel0 (m)."""
-    shortest_at_home(model, shortest)
-    home = np.zeros(rel0.shape)  # nothing has changed since
-    for p in range(shortest.shape[0]):
-        shortest[p] -= deflection(model, rel0, home, p)
-
-
-@kernel
-def _may_meet(shortest, motion):
-    """Whether ends of a member may have met: not where all are longer than their pair has moved; both (n_pair,)."""
-    may = False
-    for p in range(motion.shape[0]):
-        may = may or not shortest[p] > 1.001 * motion[p]
-    return may
 
 
 @kernel

@@ -31,7 +31,7 @@ from mdstopo.general.locate import (
     note_trial,
     quintic_ends,
 )
-from mdstopo.general.members import MODE, SET, meeting, scale_general
+from mdstopo.general.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
 from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.run_start import ROUNDING, log_start, motion_at_start, scene_size, start_modes
 from mdstopo.general.step_history import (
@@ -155,6 +155,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     noise = extent[1]
     stiffness = np.empty(n_pair)
     motion_at_start(model, member_state, workspace, rel0, v, stiffness, motion, noise)
+    shortest = np.empty(n_pair)
+    shortest_at_start(model, rel0, shortest)
     span = times[times.shape[0] - 1] - t
     step = settings[2]
     if not step > 0.0:
@@ -305,7 +307,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 return NON_FINITE, count, events, t
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(model, rel, rel0, p))
-            if where[1] < 0:
+            if where[1] < 0 and may_meet(shortest, motion):
                 relative_pose(model, q, v, before)
                 where[1] = meeting(model, segment, t, member_state, before, rel)
             done += 1.0

@@ -26,6 +26,7 @@ from mdstopo.mechanics.contact import contact_start
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     contact_second_rise,
     contact_seen,
+    deflection,
     ends_meet,
     keep_apart,
     member_motion,
@@ -165,6 +166,24 @@ def shortest_at_home(model, shortest):
             most = max(most, (SURE - 1.0) * l0 * l0 - rows[excess + i])
         p = model.block[k, PAIR]
         shortest[p] = min(shortest[p], np.sqrt(max(-most, 0.0)))
+
+
+@kernel
+def shortest_at_start(model, rel0, shortest):
+    """shortest (n_pair,) = at most the length of each pair's shortest member at the relative poses rel0 (m)."""
+    shortest_at_home(model, shortest)
+    home = np.zeros(rel0.shape)  # nothing has changed since
+    for p in range(shortest.shape[0]):
+        shortest[p] -= deflection(model, rel0, home, p)
+
+
+@kernel
+def may_meet(shortest, motion):
+    """Whether ends of a member may have met: not where all are longer than their pair has moved; both (n_pair,)."""
+    may = False
+    for p in range(motion.shape[0]):
+        may = may or not shortest[p] > 1.001 * motion[p]
+    return may
 
 
 @kernel
