@@ -9,6 +9,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import lanes
 from mdstopo.general.forces import inerter_force
+from mdstopo.general.gather import poses_of_stages
 from mdstopo.general.general_model import (
     CODE,
     COUNT,
@@ -25,21 +26,15 @@ from mdstopo.general.general_model import (
 from mdstopo.general.members import SCALE, level_of, rate_of_row
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.scene_numbers import add_numbers_of_rows
-from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
 from mdstopo.general.switches import carriers
 from mdstopo.integrators.steps import DESIGN as DESIGN_STATES
 from mdstopo.mechanics.kinematics.kinematics_interface import (
-    attitude,
     freedoms,
     member_designs_of_rows,
     pair_displacement,
-    pose_size,
     spring_designs_of_rows,
-    turn_bodies,
-    turned_pose,
 )
-from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 from mdstopo.mechanics.laws.law_table import FREE_LENGTH, SPRING
 
 
@@ -62,19 +57,12 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
     count = z.shape[0]
     n_pair = model.pair.shape[0]
     work[DESIGN_STATES] += stages * count
-    rel = np.empty((stages, n_pair, pose_size(model)))
+    rel = poses_of_stages(model, history, o, stages)
     u = np.empty((count, stages, n_pair, freedoms(model)))
-    turned = np.empty((model.home.shape[0], attitude(model)))
     carries = carriers(model)
     for j in range(stages):
-        q = history.stage_q[o + j]
-        if has_factors(history):
-            copy_rows(history.turned[o + j], turned)
-        else:
-            turn_bodies(model, q, turned)
         for p in range(n_pair):
             if carries[p] != 0:
-                turned_pose(model, p, turned, q, history.stage_v[o + j], rel[j])
                 for m in range(count):
                     pair_displacement(model, rel[j], p, z[m, j], u[m, j, p])
                     for i in range(freedoms(model)):
