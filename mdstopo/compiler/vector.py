@@ -53,8 +53,8 @@ def inverse_root(vector: Floats, floor: float) -> Floats:
         return where_larger(vector, floor, 1.0 / np.sqrt(vector))
 
 
-def where_larger(vector: Floats, floor: float, value: Floats) -> Floats:
-    """The value where x > floor, else 0."""
+def where_larger(vector: Floats, floor: float | Floats, value: Floats) -> Floats:
+    """The value where x > floor, else 0; floor is a number, or one for each lane."""
     return np.where(vector > floor, value, 0.0)
 
 

@@ -218,7 +218,8 @@ def _refined(build: Any, x: Any) -> Any:
 
 def _where_larger(build: Any, _kinds: Any, arguments: Any) -> Any:
     x, floor, value = arguments
-    return build.select(build.fcmp_ordered(">", x, _same(build, floor)), value, _constant(0.0))
+    least = floor if floor.type == x.type else _same(build, floor)
+    return build.select(build.fcmp_ordered(">", x, least), value, _constant(0.0))
 
 
 for _signs, _instruction in (
@@ -241,6 +242,7 @@ _implement(vector.largest, (VectorType,), lambda _whole: types.float64, _folded(
 _implement(vector.larger, (VectorType, VectorType), _vector, lambda build, _kinds, both: _larger_of(build, *both))
 _implement(vector.magnitude, (VectorType,), _vector, lambda build, _kinds, given: _unary(build, "fabs", given[0]))
 _implement(vector.inverse_root, (VectorType, types.Float), _vector, _inverse_root)
-_implement(vector.where_larger, (VectorType, types.Float, VectorType), _vector, _where_larger)
+for _floor in (types.Float, VectorType):
+    _implement(vector.where_larger, (VectorType, _floor, VectorType), _vector, _where_larger)
 _implement(vector.negative, (VectorType,), lambda _vector: types.int64, _negative)
 _implement(vector.unmarked, (VectorType, types.Integer), _vector, _unmarked)

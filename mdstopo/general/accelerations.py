@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.places import index
 from mdstopo.general.forces import add_inerters, add_tangents_of_inerters, general_forces
 from mdstopo.general.general_model import JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
 from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
@@ -61,6 +62,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     load_slopes,
     most_rows,
     pair_matrix_vjp,
+    pair_pose_vjp,
     place_joint,
     point_joint_vjp,
     pose_size,
@@ -173,8 +175,8 @@ def gather(model, j, x, out):
     a = first_freedom(model, model.joint[j, JOINT_FIRST])
     b = first_freedom(model, model.joint[j, JOINT_SECOND])
     for i in range(each):
-        out[i] = x[a + i]
-        out[each + i] = x[b + i]
+        out[index(i)] = x[index(a + i)]
+        out[index(each + i)] = x[index(b + i)]
 
 
 @part
@@ -463,8 +465,9 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
         return singular
     known = workspace.known  # zero but for what is driven
     drive_acceleration(model, segment, t, known)
+    force = workspace.f
     for d in range(n):
-        a[d] = workspace.f[d]
+        a[index(d)] = force[index(d)]
     if model.driven.shape[0] > 0 and workspace.switches[DIAGONAL] == 0:
         for p in range(model.pair.shape[0]):
             for i in range(pair_freedoms(model)):
@@ -482,8 +485,9 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
         for r in range(most_rows(model)):
             if row[j, r] >= 0:
                 value = -gamma[j, r]
-                for i in range(each):
-                    value -= jac[j, r, i] * known[one + i] + jac[j, r, each + i] * known[two + i]
+                if model.driven.shape[0] > 0:
+                    for i in range(each):
+                        value -= jac[j, r, i] * known[one + i] + jac[j, r, each + i] * known[two + i]
                 lam[row[j, r]] = value
     solve_unknowns(model, workspace, a, lam)
     for i in range(model.driven.shape[0]):
@@ -577,11 +581,16 @@ def turns_vjp(model, turn, z, bar_q, bar_v):
     turns = rotations(model)
     for first in range(0, z.shape[0], freedoms(model)):
         own = first + freedoms(model) - turns
-        for d in range(first, first + freedoms(model)):
-            for r in range(turns):
-                bar_q[own + r] += turn[d, r] * z[d]
-            for r in range(turns, load_slopes(model)):
-                bar_v[own + r - turns] += turn[d, r] * z[d]
+        for r in range(turns):
+            value = bar_q[index(own + r)]
+            for d in range(first, first + freedoms(model)):
+                value += turn[index(d), index(r)] * z[index(d)]
+            bar_q[index(own + r)] = value
+        for r in range(turns, load_slopes(model)):
+            value = bar_v[index(own + r - turns)]
+            for d in range(first, first + freedoms(model)):
+                value += turn[index(d), index(r)] * z[index(d)]
+            bar_v[index(own + r - turns)] = value
 
 
 @kernel
@@ -598,6 +607,26 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
     pairs_vjp(model, workspace, workspace.carries, k, c, z, bar_q, bar_v)
+    if workspace.switches[TURNING] != 0:
+        turns_vjp(model, turn, z, bar_q, bar_v)
+
+
+@kernel
+def poses_vjp(model, workspace, rel, sums, turn, z, bar_q, bar_v):
+    """`carried_vjp` of poses and sums over members, where nothing is damped.
+
+    Constant:
+      model: the compiled scene.
+      workspace: the workspace (`carries`, `switches`).
+      rel (n_pair, POSE), sums (n_pair, SUMS): of these pairs.
+      turn (n, `load_slopes`): slopes of the turning loads.
+      z (n,): virtual displacements; driven parts are 0.
+    Out:
+      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
+    """
+    for p in range(model.pair.shape[0]):
+        if workspace.carries[p] != 0:
+            pair_pose_vjp(model, p, rel, sums, z, bar_q)
     if workspace.switches[TURNING] != 0:
         turns_vjp(model, turn, z, bar_q, bar_v)
 

@@ -137,7 +137,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         size=np.array(
             [
                 *layout.size, int(by_order_8), len(layout.schur_constant), bodies.load_slopes, bodies.attitude,
-                allowed() if len(case.load_cases) == 1 else 1,
+                allowed() if len(case.load_cases) == 1 else 1, bodies.pose_size,
             ], np.int64,
         ),
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,

@@ -12,7 +12,7 @@ from mdstopo.general.general_contact import add_contacts
 from mdstopo.general.general_model import CODE, COUNT, INERTER, PAIR, START
 from mdstopo.general.members import SCALE, general_sums
 from mdstopo.general.strides import FORCE, pair_freedoms, place_in_pair, sums_size, tangent_column
-from mdstopo.general.switches import APART, DAMPED, TURNING
+from mdstopo.general.switches import APART, DAMPED, TURNING, UNFORMED
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_bushings,
     add_inerter_tangents,
@@ -185,7 +185,8 @@ def forces_of_sums(model, member_state, segment, t, q, v, tangent, rel, sums, k,
         damped = workspace.switches[DAMPED] != 0
         for p in range(pair.shape[0]):
             if carries[p] != 0:
-                pair_tangent(model, p, rel, sums, damped, k, c)
+                if workspace.switches[UNFORMED] == 0:
+                    pair_tangent(model, p, rel, sums, damped, k, c)
             elif workspace.switches[APART] == 0:
                 none = k[p]
                 none[:] = 0.0

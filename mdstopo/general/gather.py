@@ -23,7 +23,7 @@ from mdstopo.general.general_model import (
 from mdstopo.general.general_responses import MEMBER_FORCE, member_force
 from mdstopo.general.members import MODE, SET, level_of, rate_of_row
 from mdstopo.general.parameters import add_force_parameters, add_parameters
-from mdstopo.general.step_history import has_factors
+from mdstopo.general.step_history import has_factors, has_poses
 from mdstopo.general.strides import pair_freedoms
 from mdstopo.general.switches import carriers
 from mdstopo.integrators.steps import DESIGN as DESIGN_STATES
@@ -41,6 +41,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     turn_bodies,
     turned_pose,
 )
+from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 from mdstopo.mechanics.laws.law_table import SPRING, law
 
 
@@ -65,11 +66,13 @@ def add_design(model, segment, t, member_state, q, v, a, z, weight, out, work):
     n = model.mass.shape[0]
     work[DESIGN_STATES] += 1
     when = np.empty(1)
-    turned = np.empty((1, model.home.shape[0], attitude(model)))
+    turned = np.empty((model.home.shape[0], attitude(model)))
     when[0] = t
-    turn_bodies(model, q, turned[0])
+    turn_bodies(model, q, turned)
+    rel = np.empty((1, model.pair.shape[0], pose_size(model)))
+    pose_carriers(model, carriers(model), turned, q, v, rel[0])
     _add(
-        model, segment, when, member_state, q.reshape((1, q.shape[0])), v.reshape((1, n)), a.reshape((1, n)), turned,
+        model, segment, when, member_state, q.reshape((1, q.shape[0])), v.reshape((1, n)), a.reshape((1, n)), rel,
         z.reshape((1, n)), weight, out,
     )  # fmt: skip
 
@@ -90,27 +93,58 @@ def add_designs(model, segment, history, o, member_state, z, out, work):
     """
     end = o + z.shape[0]
     work[DESIGN_STATES] += z.shape[0]
-    if has_factors(history):
-        turned = history.turned[o:end]
-    else:
-        turned = np.empty((z.shape[0], model.home.shape[0], attitude(model)))
-        for j in range(z.shape[0]):
-            turn_bodies(model, history.stage_q[o + j], turned[j])
     _add(
         model, segment, history.when[o:end], member_state, history.stage_q[o:end], history.stage_v[o:end],
-        history.stage_a[o:end], turned, z, 0.0, out,
+        history.stage_a[o:end], poses_of_stages(model, history, o, z.shape[0]), z, 0.0, out,
     )  # fmt: skip
 
 
 @kernel
-def _add(model, segment, when, member_state, q, v, a, turned, z, weight, out):
+def poses_of_stages(model, history, o, count):
+    """(count, n_pair, POSE): relative poses at the stages from o on, of pairs that carry more than joints."""
+    if has_poses(history):
+        return history.rel[o : o + count]
+    rel = np.empty((count, model.pair.shape[0], pose_size(model)))
+    fill_poses(model, history, o, carriers(model), rel)
+    return rel
+
+
+@kernel
+def fill_poses(model, history, o, carries, rel):
+    """Compute relative poses of the pairs that carry more than joints, at the stages of a step from number o on.
+
+    model: the compiled scene. history, o: the history of steps, and the number of the first stage.
+    carries (n_pair,): of `switches.carriers`.
+    rel (stages, n_pair, POSE): out.
+    """
+    turned = np.empty((model.home.shape[0], attitude(model)))
+    for j in range(rel.shape[0]):
+        q = history.stage_q[o + j]
+        if has_factors(history):
+            copy_rows(history.turned[o + j], turned)
+        else:
+            turn_bodies(model, q, turned)
+        pose_carriers(model, carries, turned, q, history.stage_v[o + j], rel[j])
+
+
+@kernel
+def pose_carriers(model, carries, turned, q, v, rel):
+    """Set rel (n_pair, POSE) of the pairs with carries (n_pair,), from attitudes, coordinates and velocities."""
+    for p in range(rel.shape[0]):
+        if carries[p] != 0:
+            turned_pose(model, p, turned, q, v, rel)
+
+
+@kernel
+def _add(model, segment, when, member_state, q, v, a, rel, z, weight, out):
     """`add_design` at S states of one segment.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`. when (S,): times (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q (S, n_q), v, a (S, n): coordinates, velocities, accelerations. turned (S, n_body, A): of `turn_bodies`.
+      q (S, n_q), v, a (S, n): coordinates, velocities, accelerations.
+      rel (S, n_pair, POSE): relative poses of pairs that carry more than joints.
       z (S, n): virtual displacements.
       weight: of the stored energy.
     Out:
@@ -118,13 +152,11 @@ def _add(model, segment, when, member_state, q, v, a, turned, z, weight, out):
     """
     count = z.shape[0]
     n_pair = model.pair.shape[0]
-    rel = np.empty((count, n_pair, pose_size(model)))
     u = np.empty((count, n_pair, freedoms(model)))
     carries = carriers(model)
     for j in range(count):
         for p in range(n_pair):
             if carries[p] != 0:
-                turned_pose(model, p, turned[j], q[j], v[j], rel[j])
                 _virtual(model, rel[j], p, z[j], u[j, p])
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]

@@ -26,7 +26,18 @@ from mdstopo.general.extremes import (
     VALUE,
     row_of,
 )
-from mdstopo.general.general_model import COUNT, GROUP, INERTER, JOINT_FIRST, OFFSET, START, GeneralModel, pack_general
+from mdstopo.general.general_model import (
+    CODE,
+    COUNT,
+    GROUP,
+    INERTER,
+    JOINT_FIRST,
+    OFFSET,
+    START,
+    VARIED_PLACE,
+    GeneralModel,
+    pack_general,
+)
 from mdstopo.general.general_responses import switches_of
 from mdstopo.general.integral_reductions import value_of_integral
 from mdstopo.general.kinks import landed
@@ -36,7 +47,7 @@ from mdstopo.general.ready import Ready
 from mdstopo.general.response_shapes import shape_of
 from mdstopo.general.row_gradients import BLOCK, RowGradients
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
-from mdstopo.general.step_history import FACTORS, GRAZES, WINDOWS, history_room
+from mdstopo.general.step_history import FACTORS, GRAZES, POSES, WINDOWS, history_room
 from mdstopo.general.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.turning_drives import global_moments
 from mdstopo.general.variables import Placing
@@ -54,6 +65,7 @@ from mdstopo.integrators.steps import (
     status_of,
 )
 from mdstopo.mechanics.joints.joint_table import describe
+from mdstopo.mechanics.laws.law_table import SPRING
 from mdstopo.scene.diagnosis import fastest_body, member_in_words
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray, IndexArray
@@ -67,6 +79,8 @@ if TYPE_CHECKING:
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
+#: where a spring's damping stands among the parameters of its law
+DAMPING = 1
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -165,6 +179,17 @@ class GeneralDriver:
         """Whether vectors have one direction across them, which rows of norms can tell (`evaluation.Peak.across`)."""
         return self.scene.kinematics.rotations == 1
 
+    @property
+    def _keeps_poses(self) -> bool:
+        """Whether K of a stage is kept as poses and sums over members: of undamped members between bodies in space,
+        where that is two thirds as many numbers and less work. Contacts and damping have parts of their own in K."""
+        model = self.scene.model
+        rated = (model.block[:, CODE] != SPRING) | (model.law[:, DAMPING] != 0.0)
+        varied = model.varied[:, VARIED_PLACE] == DAMPING
+        bushed = model.bushing[:, -self.scene.kinematics.freedoms :] != 0.0
+        alike = not (np.any(rated) or np.any(varied) or np.any(bushed) or len(model.contact_pair))
+        return not self._is_planar and alike
+
     def allow(self, steps: int) -> None:
         """Limit the number of steps of a run; one that needs more ends with STEP_LIMIT."""
         self._allowed = self.limits[0] = steps
@@ -172,6 +197,8 @@ class GeneralDriver:
     def _make_room(self, steps: int, stages: int, events: int) -> None:
         # the reverse sweep uses a stage's factors again where it is explicit and the mass is diagonal
         kept = FACTORS if self.method.kind.explicit and not self._inertial else 0
+        if kept == FACTORS and self._keeps_poses:
+            kept = POSES
         if self.method.collocates:
             kept = WINDOWS
         self.limits = np.array([self._allowed, steps, stages, events, self._inertial, kept], dtype=np.int64)

@@ -133,10 +133,10 @@ class GeneralModel(NamedTuple):
     size: Annotated[
         IndexArray,
         Field(
-            "7",
+            "8",
             "solved rows; half width of the band; whether anything depends on velocity; entries of the joints' own "
             "matrix; slopes of the loads on a body; numbers of an attitude; threads that may share a pass over very "
-            "many springs, where load cases do not take them",
+            "many springs, where load cases do not take them; numbers of a relative pose",
         ),
     ]
     row_layout: Annotated[
@@ -158,9 +158,9 @@ class GeneralModel(NamedTuple):
     schur_product: Annotated[
         IndexArray,
         Field(
-            "n_product, 3",
-            "what that matrix is made of: an entry, and two slopes by the same coordinate whose product, over its "
-            "mass, belongs there",
+            "n_product, 4",
+            "what that matrix is made of: an entry, two slopes by the same coordinate whose product, over its mass, "
+            "belongs there, and for how many coordinates in a row this is so",
         ),
     ]
     schur_constant: Annotated[

@@ -18,17 +18,12 @@ part in it (`weakest`).
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.places import index
 from mdstopo.general.strides import pair_freedoms, place_in_joint
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, most_rows
 
 #: a pivot, or an eigenvalue, of a scaled matrix below this means that joints contradict or repeat each other here
 SINGULAR = 1e-12
-
-
-@kernel
-def index(i):
-    """A whole number that is known not to be negative: indexing with it compiles to shorter code."""
-    return np.uint64(i)
 
 
 @kernel
@@ -77,11 +72,18 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
     weighed = pull.reshape(pull.size)
     whole = spread.reshape(spread.size)
     for e in range(slope.shape[0]):
-        weighed[e] = slope[e] * whole[e]
+        weighed[index(e)] = slope[index(e)] * whole[index(e)]
+    constant = model.schur_constant
     for e in range(gram.shape[0]):
-        gram[e] = model.schur_constant[e]
+        gram[index(e)] = constant[index(e)]
     for m in range(product.shape[0]):
-        gram[index(product[m, 0])] += slope[index(product[m, 1])] * weighed[index(product[m, 2])]
+        entry = index(product[index(m), 0])
+        one = product[index(m), 1]
+        two = product[index(m), 2]
+        value = gram[entry]
+        for c in range(product[index(m), 3]):
+            value += slope[index(one + c)] * weighed[index(two + c)]
+        gram[entry] = value
     at = decompose(envelope, gram, diagonal)
     if at < 0 and thorough:
         at = weakest(envelope, gram, diagonal, x)
@@ -115,15 +117,15 @@ def in_pairs(envelope, i):
 
     Then both are factorised at once, which is faster: the products of one do not wait for those of the other.
     """
-    return i + 1 < envelope.shape[0] and envelope[i + 1, 0] == envelope[i, 0]
+    return i + 1 < envelope.shape[0] and envelope[index(i + 1), 0] == envelope[index(i), 0]
 
 
 @part
 def _decompose_one(envelope, gram, diagonal, i):
     """Row i of `decompose`. Returns i where the matrix is singular there, else -1."""
     inverse = diagonal[1]
-    first = envelope[i, 0]
-    own = envelope[i, 1]
+    first = envelope[index(i), 0]
+    own = envelope[index(i), 1]
     for j in range(first + 1, i):  # L D
         other = envelope[index(j), 1]
         value = gram[index(own + j)]
@@ -136,10 +138,10 @@ def _decompose_one(envelope, gram, diagonal, i):
         scaled = gram[index(own + k)] * inverse[index(k)]
         value -= gram[index(own + k)] * scaled
         gram[index(own + k)] = scaled
-    diagonal[0, i] = whole
+    diagonal[0, index(i)] = whole
     if value <= SINGULAR * whole:  # not where it is NaN: that is no fault of the joints
         return i
-    inverse[i] = 1.0 / value
+    inverse[index(i)] = 1.0 / value
     return -1
 
 
@@ -147,9 +149,9 @@ def _decompose_one(envelope, gram, diagonal, i):
 def _decompose_two(envelope, gram, diagonal, i):
     """Rows i and i + 1 of `decompose`. Returns the one at which the matrix is singular, or -1."""
     inverse = diagonal[1]
-    first = envelope[i, 0]
-    own = envelope[i, 1]
-    following = envelope[i + 1, 1]
+    first = envelope[index(i), 0]
+    own = envelope[index(i), 1]
+    following = envelope[index(i + 1), 1]
     for j in range(first + 1, i):
         other = envelope[index(j), 1]
         value = gram[index(own + j)]
@@ -173,17 +175,17 @@ def _decompose_two(envelope, gram, diagonal, i):
         second -= gram[index(following + k)] * scaled_second
         gram[index(own + k)] = scaled
         gram[index(following + k)] = scaled_second
-    diagonal[0, i] = whole
-    diagonal[0, i + 1] = whole_second
+    diagonal[0, index(i)] = whole
+    diagonal[0, index(i + 1)] = whole_second
     if value <= SINGULAR * whole:
         return i
-    inverse[i] = 1.0 / value
-    scaled = both * inverse[i]
+    inverse[index(i)] = 1.0 / value
+    scaled = both * inverse[index(i)]
     gram[index(following + i)] = scaled
     second -= both * scaled
     if second <= SINGULAR * whole_second:
         return i + 1
-    inverse[i + 1] = 1.0 / second
+    inverse[index(i + 1)] = 1.0 / second
     return -1
 
 
@@ -202,13 +204,13 @@ def growth(envelope, gram, diagonal, x):
     most = 0.0
     worst = 0
     for i in range(envelope.shape[0]):
-        own = envelope[i, 1]
+        own = envelope[index(i), 1]
         value = 0.0
-        for k in range(envelope[i, 0], i):
-            value -= gram[own + k] * x[k]
-        whole = np.sqrt(diagonal[0, i])
-        x[i] = value + (whole if value >= 0.0 else -whole)
-        square = x[i] * x[i] * diagonal[1, i]
+        for k in range(envelope[index(i), 0], i):
+            value -= gram[index(own + k)] * x[index(k)]
+        whole = np.sqrt(diagonal[0, index(i)])
+        x[index(i)] = value + (whole if value >= 0.0 else -whole)
+        square = x[index(i)] * x[index(i)] * diagonal[1, index(i)]
         size += square
         if square > most:
             most = square
@@ -246,23 +248,27 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
     count = line.shape[0]
     each = freedoms(model)
     for r in range(count):
-        e = line[r, 0]
+        e = line[index(r), 0]
+        one = line[index(r), 1]
+        two = line[index(r), 2]
         first = 0.0
         second = 0.0
         for i in range(each):
-            first += weighed[index(e + i)] * a[index(line[r, 1] + i)]
-            second += weighed[index(e + each + i)] * a[index(line[r, 2] + i)]
-        x[index(line[r, 3])] = first + second - lam[r]
+            first += weighed[index(e + i)] * a[index(one + i)]
+            second += weighed[index(e + each + i)] * a[index(two + i)]
+        x[index(line[index(r), 3])] = first + second - lam[index(r)]
     substitute(envelope, gram, diagonal, x)
     for d in range(a.shape[0]):
-        a[d] *= inverse[d]
+        a[index(d)] *= inverse[index(d)]
     for r in range(count):
-        e = line[r, 0]
-        value = x[index(line[r, 3])]
-        lam[r] = value
+        e = line[index(r), 0]
+        one = line[index(r), 1]
+        two = line[index(r), 2]
+        value = x[index(line[index(r), 3])]
+        lam[index(r)] = value
         for i in range(each):
-            a[index(line[r, 1] + i)] -= weighed[index(e + i)] * value
-            a[index(line[r, 2] + i)] -= weighed[index(e + each + i)] * value
+            a[index(one + i)] -= weighed[index(e + i)] * value
+            a[index(two + i)] -= weighed[index(e + each + i)] * value
 
 
 @kernel
@@ -272,29 +278,29 @@ def substitute(envelope, gram, diagonal, x):
     i = 0
     while i < count:
         together = in_pairs(envelope, i)
-        own = envelope[i, 1]
-        following = envelope[i + 1, 1] if together else own
-        value = x[i]
-        second = x[i + 1] if together else 0.0
-        for k in range(envelope[i, 0], i):
+        own = envelope[index(i), 1]
+        following = envelope[index(i + 1), 1] if together else own
+        value = x[index(i)]
+        second = x[index(i + 1)] if together else 0.0
+        for k in range(envelope[index(i), 0], i):
             value -= gram[index(own + k)] * x[index(k)]
             second -= gram[index(following + k)] * x[index(k)]
-        x[i] = value
+        x[index(i)] = value
         if together:
-            x[i + 1] = second - gram[index(following + i)] * value
+            x[index(i + 1)] = second - gram[index(following + i)] * value
         i += 2 if together else 1
     for i in range(count):
-        x[i] *= diagonal[1, i]
+        x[index(i)] *= diagonal[1, index(i)]
     i = count
     while i > 0:
         together = i > 1 and in_pairs(envelope, i - 2)
-        following = envelope[i - 1, 1]
-        second = x[i - 1]
+        following = envelope[index(i - 1), 1]
+        second = x[index(i - 1)]
         i -= 2 if together else 1
-        own = envelope[i, 1]
+        own = envelope[index(i), 1]
         value = 0.0
         if together:
-            value = x[i] - gram[index(following + i)] * second
-            x[i] = value
-        for k in range(envelope[i, 0], i):
+            value = x[index(i)] - gram[index(following + i)] * second
+            x[index(i)] = value
+        for k in range(envelope[index(i), 0], i):
             x[index(k)] -= gram[index(own + k)] * value + gram[index(following + k)] * second

@@ -112,9 +112,19 @@ def arrange(
             elif not any(known and slope == 0.0 for known, slope in zip(fixed, slopes, strict=True)):
                 products.append((entry, a + axis, b + axis))
     return Layout(
-        row, place, (len(columns), half), line, envelope, np.array(products, dtype=np.int64).reshape(-1, 3), steady,
-        tuple(dict.fromkeys(redundant)),
-    )  # fmt: skip
+        row, place, (len(columns), half), line, envelope, _in_runs(products), steady, tuple(dict.fromkeys(redundant))
+    )
+
+
+def _in_runs(products: list[tuple[int, int, int]]) -> IndexArray:
+    """(n_run, 4): products of slopes that stand behind each other and belong to one entry, as `schur_product`."""
+    runs: list[list[int]] = []
+    for entry, one, two in products:
+        if runs and [entry, one, two] == [runs[-1][0], runs[-1][1] + runs[-1][3], runs[-1][2] + runs[-1][3]]:
+            runs[-1][3] += 1
+        else:
+            runs.append([entry, one, two, 1])
+    return np.array(runs, dtype=np.int64).reshape(-1, 4)
 
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray, bodies: Kinematics) -> FloatArray:

@@ -10,6 +10,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import lanes
 from mdstopo.general.balance_slopes import add_numbers_of_rows
 from mdstopo.general.forces import inerter_force
+from mdstopo.general.gather import poses_of_stages
 from mdstopo.general.general_model import (
     CODE,
     COUNT,
@@ -25,21 +26,15 @@ from mdstopo.general.general_model import (
 )
 from mdstopo.general.members import SCALE, level_of, rate_of_row
 from mdstopo.general.parameters import parameter_slopes
-from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
 from mdstopo.general.switches import carriers
 from mdstopo.integrators.steps import DESIGN as DESIGN_STATES
 from mdstopo.mechanics.kinematics.kinematics_interface import (
-    attitude,
     freedoms,
     member_designs_of_rows,
     pair_displacement,
-    pose_size,
     spring_designs_of_rows,
-    turn_bodies,
-    turned_pose,
 )
-from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 from mdstopo.mechanics.laws.law_table import FREE_LENGTH, SPRING
 
 
@@ -61,12 +56,12 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
     """
     count = z.shape[0]
     work[DESIGN_STATES] += stages * count
-    rel = np.empty((stages, model.pair.shape[0], pose_size(model)))
-    u = np.empty((count, stages, model.pair.shape[0], freedoms(model)))
+    n_pair = model.pair.shape[0]
+    rel = poses_of_stages(model, history, o, stages)
+    u = np.empty((count, stages, n_pair, freedoms(model)))
     carries = carriers(model)
-    poses_of_stages(model, history, o, carries, rel)
     for j in range(stages):
-        for p in range(model.pair.shape[0]):
+        for p in range(n_pair):
             if carries[p] != 0:
                 for m in range(count):
                     pair_displacement(model, rel[j], p, z[m, j], u[m, j, p])
@@ -83,26 +78,6 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
     if model.apart.shape[0] > 0:
         for j in range(stages):
             add_numbers_of_rows(model, segment, history, o + j, z, j, out)
-
-
-@kernel
-def poses_of_stages(model, history, o, carries, rel):
-    """Relative poses of the pairs that carry more than joints, at the stages of a step from number o on.
-
-    model: the compiled scene. history, o: the history of steps, and the number of the first stage.
-    carries (n_pair,): of `switches.carriers`.
-    rel (stages, n_pair, POSE): out.
-    """
-    turned = np.empty((model.home.shape[0], attitude(model)))
-    for j in range(rel.shape[0]):
-        q = history.stage_q[o + j]
-        if has_factors(history):
-            copy_rows(history.turned[o + j], turned)
-        else:
-            turn_bodies(model, q, turned)
-        for p in range(model.pair.shape[0]):
-            if carries[p] != 0:
-                turned_pose(model, p, turned, q, history.stage_v[o + j], rel[j])
 
 
 @kernel

@@ -8,7 +8,8 @@ step before step w).
 from typing import Annotated, Any
 
 from mdstopo.compiler.fields import Field, Fields, views_of
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.places import index
 from mdstopo.general.general_model import GeneralModel
 from mdstopo.general.members import MODE, SET
 from mdstopo.general.structures import bundle
@@ -17,8 +18,9 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES, GIVEN = range(6)
-#: what is kept of a stage beside: nothing, the factors of the joints' matrix, or rows of `window`
-FACTORS, WINDOWS = 1, 2
+#: what is kept of a stage beside: nothing, the factors of the joints' matrix, rows of `window`, or factors with what K
+#: of pairs follows from in the place of K
+FACTORS, WINDOWS, POSES = 1, 2, 3
 #: rows of `window`: coefficients of the window's polynomial; x, y, u of its node (`kinematics_interface`)
 COEFFICIENT, X, Y, U = range(4)
 #: columns of `kept`
@@ -41,7 +43,11 @@ SIZES = {
     "stages": "limits[2]",
     "events": "limits[3]",
     "inertial": "stages if limits[4] != 0 else 1",
-    "factored": "stages if limits[5] == 1 else 1",
+    "pose": "model.size[7]",
+    "of_sums": "(both // 2 + 1) ** 2",
+    "factored": "stages if limits[5] == 1 or limits[5] == 3 else 1",
+    "formed": "stages if limits[5] != 3 else 1",
+    "posed": "stages if limits[5] == 3 else 1",
     "collocated": "stages if limits[5] == 2 else 1",
 }
 
@@ -70,12 +76,17 @@ class StepHistory:
     K: Annotated[
         FloatArray,
         Field(
-            "stages, n_pair, both, both",
-            "-dF/dq of each pair; where factors are kept that of pairs which carry more than joints, of the bodies "
-            "that move, without the joints' part",
+            "formed, n_pair, both, both",
+            "-dF/dq of each pair, unless `rel` and `sums` are kept; where factors are kept that of pairs which carry "
+            "more than joints, of the bodies that move, without the joints' part",
         ),
     ]
-    C: Annotated[FloatArray, Field("stages, n_pair, both, both", "-dF/dv, likewise")]
+    C: Annotated[FloatArray, Field("formed, n_pair, both, both", "-dF/dv, likewise")]
+    rel: Annotated[FloatArray, Field("posed, n_pair, pose", "relative poses of the pairs that carry more than joints")]
+    sums: Annotated[
+        FloatArray,
+        Field("posed, n_pair, of_sums", "of these Q, E, E_xi and K by the relative pose (`strides.sums_size`)"),
+    ]
     turn: Annotated[
         FloatArray, Field("stages, n, load_slopes", "slopes of the loads by their bodies' turns and turning rates")
     ]
@@ -126,14 +137,15 @@ def carve_history(model, limits, floats, ints):
     """A `StepHistory` over flat arrays.
 
     model: the compiled scene. limits (6,): steps allowed, room for steps, stages, events, whether there are inerters,
-    what is kept of a stage beside (FACTORS, WINDOWS). floats, ints: as long as `history_room` says.
+    what is kept of a stage beside (FACTORS, WINDOWS, POSES). floats, ints: as long as `history_room` says.
     """
 
 
 @kernel
-def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
+def keep_stage(model, history, o, t, q, v, a, lam, workspace, tangent):
     """Store the state, accelerations and tangents of a stage.
 
+    model: the compiled scene.
     history: the history of steps (`StepHistory`).
     o: number of the stage.
     t: time (s).
@@ -143,11 +155,9 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
     tangent: whether its tangents are stored, and the factors of the joints' matrix where these are kept.
     """
     history.when[o] = t
-    for d in range(q.shape[0]):
-        history.stage_q[o, d] = q[d]
-    for d in range(v.shape[0]):
-        history.stage_v[o, d] = v[d]
-        history.stage_a[o, d] = a[d]
+    copy_vector(q, history.stage_q[o])
+    copy_vector(v, history.stage_v[o])
+    copy_vector(a, history.stage_a[o])
     copy_vector(lam, history.lam[o])
     if not tangent:
         return
@@ -156,6 +166,12 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
     apart = has_factors(history)
     for p in range(workspace.k.shape[0]):
         kept = workspace.carries[p] if apart else BOTH
+        if has_poses(history):
+            if kept != 0:
+                copy_vector(workspace.rel[p], history.rel[o, p])
+                own = history.sums[o, p]
+                copy_vector(workspace.sums[p, : own.shape[0]], own)
+            continue
         copy_carried(kept, workspace.k[p], history.K[o, p])
         if damped:
             copy_carried(kept, workspace.c[p], history.C[o, p])
@@ -163,7 +179,12 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
         _copy(workspace.mass, history.mass[o])
     if apart:
         _copy(workspace.turned, history.turned[o])
-        _copy(workspace.pull, history.pull[o])
+        pull = workspace.pull.reshape(workspace.pull.size)
+        kept_pull = history.pull[o].reshape(pull.size)
+        for r in range(model.row_layout.shape[0]):  # joints have room for more rows than most have
+            first = model.row_layout[r, 0]
+            for i in range(first, first + workspace.pull.shape[2]):
+                kept_pull[index(i)] = pull[index(i)]
         copy_vector(workspace.gram, history.gram[o])
         _copy(workspace.diagonal, history.diagonal[o])
 
@@ -194,6 +215,12 @@ def _copy(source, target):
 def has_factors(history):
     """Whether the stages' factors of the joints' matrix are kept."""
     return history.turned.shape[0] == history.when.shape[0]
+
+
+@part
+def has_poses(history):
+    """Whether poses and sums over members are kept of the stages, in the place of K."""
+    return history.rel.shape[0] == history.when.shape[0]
 
 
 @kernel
@@ -247,4 +274,4 @@ def events_included(member_state):
 def copy_vector(source, target):
     """Copy a vector: target = source."""
     for i in range(source.shape[0]):
-        target[i] = source[i]
+        target[index(i)] = source[index(i)]

@@ -15,8 +15,8 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.general.method_interface import is_explicit, scheme
 from mdstopo.general.projection import project
-from mdstopo.general.step_history import FIRST, has_factors, keep_stage
-from mdstopo.general.switches import APART, THOROUGH
+from mdstopo.general.step_history import FIRST, has_factors, has_poses, keep_stage
+from mdstopo.general.switches import APART, THOROUGH, UNFORMED
 from mdstopo.integrators.runge_kutta_tables import AA, BB, GENERAL, INSIDE, STAGES, VECTORS, A, B, C, D
 from mdstopo.integrators.steps import FORCES, TANGENTS
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, end_state, stage_state
@@ -48,6 +48,7 @@ def make_stages(
     """Make the balances of some explicit stages of a step; see `method_interface.make_stages`."""
     workspace.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
     workspace.switches[APART] = 1 if has_factors(history) else 0
+    workspace.switches[UNFORMED] = 1 if has_poses(history) else 0
     singular = -1
     for i in range(first, stop):
         stage_state(model, table, h, i, q0, v0, q, v, a, workspace.slopes)
@@ -59,9 +60,10 @@ def make_stages(
         if singular >= 0:
             break
         if o >= 0:
-            keep_stage(history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
+            keep_stage(model, history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
     workspace.switches[THOROUGH] = 1
     workspace.switches[APART] = 0
+    workspace.switches[UNFORMED] = 0
     return singular
 
 

@@ -14,12 +14,13 @@ from mdstopo.general.accelerations import (
     joint_state,
     joints_vjp,
     place_joints,
+    poses_vjp,
     solve_unknowns,
 )
 from mdstopo.general.joint_matrix import solve_joints
 from mdstopo.general.method_interface import is_explicit
 from mdstopo.general.projection import project_back, project_forward
-from mdstopo.general.step_history import FIRST, copy_carried, has_factors, mass_of
+from mdstopo.general.step_history import FIRST, copy_carried, has_factors, has_poses, mass_of
 from mdstopo.general.step_inside import table_of_step
 from mdstopo.general.switches import DAMPED
 from mdstopo.integrators.runge_kutta_tables import AA, A
@@ -27,6 +28,7 @@ from mdstopo.integrators.steps import REVERSE
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_shift,
     end_jvp,
+    pair_tangent,
     stage_jvp,
     stage_vjp,
     start_vjp,
@@ -43,19 +45,24 @@ def lay_out(model, history, o, workspace):
     """Put the joints of stage o, with their slopes, into the workspace. Returns K and C of the stage."""
     q = history.stage_q[o]
     v = history.stage_v[o]
-    k = history.K[o]
-    c = history.C[o]
     if has_factors(history):
         copy_rows(history.turned[o], workspace.turned)
         workspace.k[:] = 0.0
         workspace.c[:] = 0.0
-        for p in range(k.shape[0]):
-            copy_carried(workspace.carries[p], k[p], workspace.k[p])
+        for p in range(model.pair.shape[0]):
+            if has_poses(history):
+                if workspace.carries[p] != 0:
+                    no = np.bool_(False)
+                    pair_tangent(model, p, history.rel[o], history.sums[o], no, workspace.k, workspace.c)
+                continue
+            copy_carried(workspace.carries[p], history.K[o, p], workspace.k[p])
             if workspace.switches[DAMPED] != 0:
-                copy_carried(workspace.carries[p], c[p], workspace.c[p])
+                copy_carried(workspace.carries[p], history.C[o, p], workspace.c[p])
         k = workspace.k
         c = workspace.c
     else:
+        k = history.K[o]
+        c = history.C[o]
         turn_bodies(model, q, workspace.turned)
         joint_state(model, q, v, workspace)
     joint_slopes(model, q, v, history.stage_a[o], history.lam[o], workspace)
@@ -101,7 +108,10 @@ def stage_back(model, history, o, workspace, z, y, bar_q, bar_v):
     """
     if has_factors(history):
         solve_joints(model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, z, y)
-        carried_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, bar_q, bar_v)
+        if has_poses(history):
+            poses_vjp(model, workspace, history.rel[o], history.sums[o], history.turn[o], z, bar_q, bar_v)
+        else:
+            carried_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, bar_q, bar_v)
         joints_vjp(model, workspace, z, y, bar_q, bar_v)
         return
     solve_unknowns(model, workspace, z, y)

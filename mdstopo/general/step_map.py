@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.general.gather import fill_poses
 from mdstopo.general.general_model import CODE, DESIGN, INERTER, PAIR
 from mdstopo.general.method_interface import step_forward
-from mdstopo.general.row_design import add_designs_of_rows, add_members_of_rows, poses_of_stages
+from mdstopo.general.row_design import add_designs_of_rows, add_members_of_rows
 from mdstopo.general.row_sweep import add_share
 from mdstopo.general.step_history import FIRST, SEGMENT
 from mdstopo.general.step_linear import keep_free
@@ -128,7 +129,7 @@ def find_step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, wor
     width = step.by_state.shape[0]
     units = width + s * (step.acting.shape[0] * freedoms(model) if by_poses else n)
     if by_poses:
-        poses_of_stages(model, history, o, step.carries, step.rel[:s])
+        fill_poses(model, history, o, step.carries, step.rel[:s])
     settled = True
     b = 0
     while b < units:

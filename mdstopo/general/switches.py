@@ -10,16 +10,16 @@ from mdstopo.mechanics.laws.law_table import SPRING
 #: places of a workspace's `switches`: whether the mass is diagonal; whether the factors in the workspace are those of
 #: the joints' matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small
 #: eigenvalue; whether tangents leave out the joints' part; whether loads may depend on how bodies turn (else `turn`
-#: stays zero)
-DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING = range(6)
+#: stays zero); whether tangents of pairs are left as what they follow from, poses and sums over members
+DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING, UNFORMED = range(7)
 #: which bodies of a pair move (`movers`)
 BOTH, SECOND, FIRST = 1, 2, 3
 
 
 @kernel
 def switches_of(model):
-    """The arrays (6,) of a new workspace for members that switch."""
-    switches = np.zeros(6, np.int64)
+    """The arrays (7,) of a new workspace for members that switch."""
+    switches = np.zeros(7, np.int64)
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
     switches[DAMPED] = 1 if is_damped(model) else 0
     switches[THOROUGH] = 1

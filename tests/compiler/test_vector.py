@@ -55,6 +55,12 @@ def _chosen(x, value, out):
 
 
 @compiled
+def _above(x, least, value, out):
+    for i in range(0, len(x), lanes()):
+        store(out, i, where_larger(load(x, i), load(least, i), load(value, i)))
+
+
+@compiled
 def _mixed(x, y, out):
     sums = zero()
     most = zero()
@@ -116,6 +122,10 @@ def test_values_are_those_of_arrays_where_there_is_more_than_the_floor():
     _chosen(x, value, out)
     np.testing.assert_array_equal(out, np.where(x > FLOOR, value, 0.0))
     np.testing.assert_array_equal(out, where_larger(x, FLOOR, value))
+    least = np.where(np.arange(64) % 3 == 0, np.nan, x[::-1])
+    _above(x, least, value, out)
+    np.testing.assert_array_equal(out, np.where(x > least, value, 0.0))
+    np.testing.assert_array_equal(out, where_larger(x, least, value))
 
 
 def test_operators_are_those_of_arrays():

@@ -37,7 +37,6 @@ NO_STRIDES = {
     ("general_driver.py", "reshape(events, 6)"): "columns of an event",
     ("extremes.py", "reshape(count, SAMPLES, 3)"): "a response, its rate and its member",
     ("generalized_alpha_step.py", "range(3)"): "names of columns",
-    ("layout.py", "reshape(-1, 3)"): "columns of a product",
     ("members.py", "range(3)"): "names of columns",
     ("general_model.py", "range(6)"): "names of columns",
     ("peak_search.py", "range(3)"): "names of columns",
@@ -47,7 +46,6 @@ NO_STRIDES = {
     ("settle.py", "range(3)"): "how often it lands",
     ("step_history.py", "range(3)"): "names of columns",
     ("step_history.py", "range(6)"): "names of columns",
-    ("switches.py", "range(6)"): "names of columns",
 }
 #: modules that say what is planar, or spatial, when a case is compiled
 OF_ONE_DIMENSION = {"planar_scene.py", "spatial_scene.py", "turning_drives.py"}
@@ -56,7 +54,7 @@ OF_THE_PLANE = {
     "generalized_alpha.py": {"planar_poses"},  # copy_rows, which copies any rows
     "general_model.py": {"planar"},  # says how the bodies of this model move
     "planar_scene.py": {"planar"},  # what is planar when a case is compiled
-    "row_design.py": {"planar_poses"},
+    "gather.py": {"planar_poses"},
     "step_linear.py": {"planar_poses"},
 }
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
+from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.mechanics.kinematics.spatial_joints import ROWS, ROWS_OF
 from mdstopo.mechanics.kinematics.spatial_poses import POSE, S, W
@@ -247,6 +249,31 @@ def test_a_matrix_of_a_pair_is_multiplied_transposed(p: int) -> None:
     expected = bar.copy()
     expected[both] -= m.T @ z[both]
     KERNELS.pair_matrix_vjp(MODEL, p, m, z, bar)
+    same(bar, expected, 1e-14)
+
+
+@pytest.mark.parametrize("kinematics", [PLANAR, SPATIAL])
+@pytest.mark.parametrize("bodies", [(0, 1), (1, 0)])
+def test_a_pair_pulls_back_by_its_pose_and_sums_as_by_its_tangent(
+    kinematics: Kinematics, bodies: tuple[int, int]
+) -> None:
+    rng, each = np.random.default_rng(8), kinematics.freedoms
+    kernels = SimpleNamespace(**kinematics.kernels)
+    if kinematics is SPATIAL:
+        model, q, v = SimpleNamespace(**{**vars(MODEL), "pair": np.array([[0, 1], bodies])}), Q, V
+    else:
+        home = np.zeros((3, 5))
+        model = SimpleNamespace(pair=np.array([[0, 1], bodies]), home=home)
+        q, v = rng.normal(size=(2, 3 * each))
+    rel = np.zeros((2, kinematics.pose_size))
+    kernels.relative_pose(model, q, v, rel)
+    sums = rng.normal(size=(2, 2 * each + 1 + each * each + each * (each + 1) // 2))
+    k, c = np.zeros((2, 2, 2 * each, 2 * each))
+    kernels.pair_tangent(model, 1, rel, sums, False, k, c)
+    z, bar = rng.normal(size=(2, 3 * each))
+    expected = bar.copy()
+    kernels.pair_matrix_vjp(model, 1, k[1], z, expected)
+    kernels.pair_pose_vjp(model, 1, rel, sums, z, bar)
     same(bar, expected, 1e-14)
 
 

@@ -656,6 +656,20 @@ def pair_matrix_vjp(model, p, m, z, bar):
     raise NotImplementedError
 
 
+def pair_pose_vjp(model, p, rel, sums, z, bar):
+    """bar (n,) -= K^T z of pair p for z (n,), where nothing is damped, without forming K.
+
+    In:
+      model: the compiled scene.
+      p: the pair.
+      rel (n_pair, POSE), sums (n_pair, SUMS): as `pair_tangent` takes them; of the sums those before C are read.
+      z (n,): virtual displacements.
+    Out:
+      bar (n,): subtracted from.
+    """
+    raise NotImplementedError
+
+
 def pair_stiffness(model, sums, p):
     """A measure of how stiff the members of a pair are against displacements (N/m), from its sums."""
     raise NotImplementedError

@@ -236,6 +236,14 @@ def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
 
 
 @part
+def pair_pose_vjp(model, p, rel, sums, z, bar):
+    """K has six rows here, so it is formed; see `kinematics_interface.pair_pose_vjp`."""
+    k = np.empty((rel.shape[0], 2 * FREEDOMS, 2 * FREEDOMS))
+    pair_tangent(model, p, rel, sums, np.bool_(False), k, k)
+    pair_matrix_vjp(model, p, k[p], z, bar)
+
+
+@part
 def pair_matrix_vjp(model, p, m, z, bar):
     """Six numbers of z, which are read once."""
     one = FREEDOMS * model.pair[p, 0]
@@ -422,7 +430,7 @@ _KERNELS = (
     planar_windows.window_slopes,
     planar_steps.quintic, planar_drives.drive_state, planar_drives.drive_acceleration,
     turn_bodies, planar_members.turn_of, relative_pose, turned_pose, pose_acceleration, pair_displacement,
-    add_pair_force, pair_tangent, pair_matrix_vjp, pair_stiffness, turning_rate, add_loads, load_tangent,
+    add_pair_force, pair_tangent, pair_matrix_vjp, pair_pose_vjp, pair_stiffness, turning_rate, add_loads, load_tangent,
     home_extent, deflection, largest_turn, motion_weights, noise_of, arm_of, gross_loads, add_gross_force,
     rounding_of_pairs,
     planar_members.stretch_of, planar_members.member_motion, planar_members.motion_of_ends, planar_members.member_work,

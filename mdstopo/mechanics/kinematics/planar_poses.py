@@ -13,6 +13,7 @@ digits of members that hardly stretch.
 import math
 
 from mdstopo.compiler.jit import part
+from mdstopo.compiler.places import index
 from mdstopo.scene.springs_model import HOME_COS, HOME_SIN, HOME_X, HOME_Y
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A, then what has changed since
@@ -124,8 +125,10 @@ def fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel):
 def copy_rows(source, target):
     """target = source, two-dimensional."""
     for i in range(source.shape[0]):
+        one = source[i]
+        other = target[i]
         for j in range(source.shape[1]):
-            target[i, j] = source[i, j]
+            other[index(j)] = one[index(j)]
 
 
 @part

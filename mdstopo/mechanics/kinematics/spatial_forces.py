@@ -6,6 +6,7 @@ Moments on a body are in its principal axes: its turning rate follows J omega' +
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.places import index
 from mdstopo.compiler.vector import lanes, load, store
 from mdstopo.mechanics.kinematics.spatial_poses import (
     D_RATE,
@@ -55,16 +56,17 @@ def _load(model, segment, k, first, tau):
 @part
 def _inertia_times(model, d, a):
     """J a for the body whose first freedom is d."""
-    return model.mass[d + 3] * a[0], model.mass[d + 4] * a[1], model.mass[d + 5] * a[2]
+    inertia = vector_at(model.mass, d + 3)
+    return inertia[0] * a[0], inertia[1] * a[1], inertia[2] * a[2]
 
 
 @kernel
 def add_loads(model, segment, t, q, v, f):
     """Loads, gravity and gyroscopic moments; see `kinematics_interface.add_loads`."""
     tau = t - model.times[segment]
-    force = model.force
-    for i in range(force.shape[1]):
-        f[i] += force[segment, i, 0] + tau * force[segment, i, 1]
+    force = model.force[segment]
+    for i in range(force.shape[0]):
+        f[index(i)] += force[index(i), 0] + tau * force[index(i), 1]
     for body in range(model.home.shape[0]):
         d = FREEDOMS * body
         omega = vector_at(v, d + 3)
@@ -135,7 +137,7 @@ def load_tangent(model, segment, t, q, v, turn):
             e = unit(c)
             slope = minus(cross(spin, e), cross(omega, _inertia_times(model, d, e)))
             for i in range(3):
-                turn[d + 3 + i, ROTATIONS + c] = slope[i]
+                turn[index(d + 3 + i), index(ROTATIONS + c)] = slope[i]
     if model.load_body.shape[0] == 0 and model.timed_load.shape[0] == 0:
         return
     for k in range(model.load_body.shape[0]):
@@ -344,10 +346,52 @@ def pair_matrix_vjp(model, p, m, z, bar):
             own = FREEDOMS * model.pair[p, i]
             for r in range(FREEDOMS):
                 row = m[FREEDOMS * i + r]
-                push = plus(push, times(z[own + r], vector_at(row, first)))
-                moment = plus(moment, times(z[own + r], vector_at(row, first + 3)))
+                along = z[index(own + r)]
+                push = plus(push, times(along, vector_at(row, first)))
+                moment = plus(moment, times(along, vector_at(row, first + 3)))
         put(bar, at, minus(vector_at(bar, at), push))
         put(bar, at + 3, minus(vector_at(bar, at + 3), moment))
+
+
+@part
+def pair_pose_vjp(model, p, rel, sums, z, bar):
+    """bar -= K^T z without K; see `kinematics_interface.pair_pose_vjp`.
+
+    With u = (u_d, u_phi) = T z, Q = (f, m) and K = T^T K_xi T - d(T^T Q)/dq, of which the second part is
+
+        turns of the first body:  -f x u_d,     of the second:  -S^T (m x u_phi),
+        places of the first body: R_A (dtheta_A x f), of the second the opposite,
+
+    K^T z = T^T (K_xi^T u - (z_A x f, S z_B x m)), and for the turn of the first body R_A^T (z_xB - z_xA) x f besides;
+    z_A and z_B are the turns in z, z_xA and z_xB its places.
+    """
+    i = FREEDOMS * model.pair[p, 0]
+    j = FREEDOMS * model.pair[p, 1]
+    r = rel[p]
+    o = sums[p]
+    push = vector_at(o, 0)
+    moment = vector_at(o, 3)
+    d = vector_at(r, D)
+    first = vector_at(z, i + 3)
+    second = turned(r, S, vector_at(z, j + 3))
+    apart = turned_back(r, TURN_A, minus(vector_at(z, j), vector_at(z, i)))
+    by_shift = cross(push, first)
+    by_turn = cross(moment, second)
+    move = plus(apart, cross(d, first))
+    turn = minus(second, first)
+    for c in range(3):
+        along = move[0] if c == 0 else move[1] if c == 1 else move[2]
+        about = turn[0] if c == 0 else turn[1] if c == 1 else turn[2]
+        at = K + FREEDOMS * c
+        other = at + 3 * FREEDOMS
+        by_shift = plus(by_shift, plus(times(along, vector_at(o, at)), times(about, vector_at(o, other))))
+        by_turn = plus(by_turn, plus(times(along, vector_at(o, at + 3)), times(about, vector_at(o, other + 3))))
+    force = turned(r, TURN_A, by_shift)
+    put(bar, j, minus(vector_at(bar, j), force))
+    put(bar, j + 3, minus(vector_at(bar, j + 3), turned_back(r, S, by_turn)))
+    add(bar, i, force)
+    own = minus(plus(cross(by_shift, d), cross(apart, push)), by_turn)
+    put(bar, i + 3, minus(vector_at(bar, i + 3), own))
 
 
 @part

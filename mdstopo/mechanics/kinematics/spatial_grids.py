@@ -283,6 +283,7 @@ def short_sums(member, width, scale, start, stop, length, p, r, counted, tangent
     for first in range(start, min(start + step, stop), lanes()):
         q = _rows(member, width, Q, first)
         a = turned(r, S, q)
+        end = plus(a, origin)
         u = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, q))
         moved = plus(u, u), dot(u, u)
         push = none
@@ -291,7 +292,7 @@ def short_sums(member, width, scale, start, stop, length, p, r, counted, tangent
         two = zero(), zero()
         others = none
         for at in range(first, stop, step):
-            x = minus(a, minus(_rows(member, width, P, at), origin))
+            x = minus(end, _rows(member, width, P, at))
             square = dot(x, x)
             y = inverse_root(square, ZERO_LENGTH_SQUARED)
             stretch = _stretch(moved, x, square, y, load(member, L0 * width + at), load(member, EXCESS * width + at))
@@ -330,7 +331,13 @@ def _add_sums(k, energy, force, slope, counted, o):
 def period(length, count):
     """After how many vectors of `count` members those of whole rows of so many are through."""
     vectors = 1
-    while vectors * count % length != 0:
+    left = count  # of the members so far, behind whole rows; by subtraction, for divisions take as long as members do
+    while left >= length:
+        left -= length
+    while left > 0:
+        left += count
+        while left >= length:
+            left -= length
         vectors += 1
     return vectors
 
@@ -344,9 +351,10 @@ def _stretch(moved, x, square, y, free, excess):
     """
     long = square * y
     stretch = long - free
-    squares = (excess - moved[1]) + dot(moved[0], x)
+    twice = moved[0]
+    squares = (((excess - moved[1]) + twice[0] * x[0]) + twice[1] * x[1]) + twice[2] * x[2]
     off = 0.5 * y * (stretch * (long + free) - squares)
-    return stretch - where_larger(square - moved[1], 0.0, off)
+    return stretch - where_larger(square, moved[1], off)
 
 
 @part

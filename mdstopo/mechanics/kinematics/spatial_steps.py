@@ -11,6 +11,7 @@ Backwards, with u_i the cotangent of the turn of stage i, g_i that of its turnin
 """
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.places import index
 from mdstopo.mechanics.kinematics.planar_steps import BY_RATE, BY_STAGE, END, END_RATE, NODES, VECTORS, hermite
 from mdstopo.mechanics.kinematics.rotations import (
     exponential,
@@ -33,10 +34,10 @@ from mdstopo.mechanics.kinematics.vectors import add, dot, minus, plus, put, tim
 @part
 def put_quaternion(q, i, e):
     """q[i : i + 4] = e."""
-    q[i] = e[0]
-    q[i + 1] = e[1]
-    q[i + 2] = e[2]
-    q[i + 3] = e[3]
+    q[index(i)] = e[0]
+    q[index(i + 1)] = e[1]
+    q[index(i + 2)] = e[2]
+    q[index(i + 3)] = e[3]
 
 
 @part
@@ -197,31 +198,39 @@ def advance_coordinates(model, q, v, a, e, out):
 def stage_state(model, table, h, i, q0, v0, q, v, a, slopes):
     """Coordinates and velocities of stage i; see `kinematics_interface.stage_state`.
 
-    slopes (s, n): of each stage k_i in the places of its turns.
+    slopes (s, n): of each stage k_i in the places of its turns, 0 in the others.
     """
     ahead = h * table[VECTORS, NODES, i]
     stage = q[i]
+    own = slopes[i]  # first has the sums of accelerations, then that of slopes
+    own[:] = 0.0
+    for j in range(i):
+        add_row(h * h * table[BY_STAGE, i, j], a[j], own)
+    velocity = v[i]
+    for d in range(v0.shape[0]):
+        velocity[index(d)] = v0[index(d)]
     for body in range(v0.shape[0] // FREEDOMS):
         c = COORDINATES * body
         d = FREEDOMS * body
-        place = plus(vector_at(q0, c), times(ahead, vector_at(v0, d)))
-        velocity = vector_at(v0, d)
-        omega = vector_at(v0, d + 3)
-        turn = (0.0, 0.0, 0.0)
-        for j in range(i):
-            w = h * h * table[BY_STAGE, i, j]
-            u = h * table[BY_RATE, i, j]
-            if w != 0.0:
-                place = plus(place, times(w, vector_at(a[j], d)))
-            if u != 0.0:
-                velocity = plus(velocity, times(u, vector_at(a[j], d)))
-                omega = plus(omega, times(u, vector_at(a[j], d + 3)))
-                turn = plus(turn, times(u, vector_at(slopes[j], d + 3)))
-        put(stage, c, place)
+        put(stage, c, plus(plus(vector_at(q0, c), times(ahead, vector_at(v0, d))), vector_at(own, d)))
+    own[:] = 0.0
+    for j in range(i):
+        add_row(h * table[BY_RATE, i, j], a[j], velocity)
+        add_row(h * table[BY_RATE, i, j], slopes[j], own)
+    for body in range(v0.shape[0] // FREEDOMS):
+        c = COORDINATES * body
+        d = FREEDOMS * body
+        turn = vector_at(own, d + 3)
         put_quaternion(stage, c + 3, turn_by(quaternion_at(q0, c + 3), turn))
-        put(v[i], d, velocity)
-        put(v[i], d + 3, omega)
-        put(slopes[i], d + 3, vector_rate(turn, omega))
+        put(own, d + 3, vector_rate(turn, vector_at(velocity, d + 3)))
+
+
+@part
+def add_row(w, row, out):
+    """out += w row, unless w is 0; as a loop of its own it is done in vectors."""
+    if w != 0.0:
+        for d in range(out.shape[0]):
+            out[index(d)] += w * row[index(d)]
 
 
 @kernel
@@ -261,18 +270,18 @@ def _end_turn(table, s, h, q, v, c, d):
 
 
 @part
-def _slope_bar(table, s, h, i, u, d, end_bar):
-    """bar k_i of a stage.
+def _slope_bars(table, h, i, u, out):
+    """bar k_i of all bodies at a stage, in the places of their turns, into out (n,).
 
-    table, s, h, i: the method's table, number of its stages, length of the step, the stage.
-    u (s, n): of the later stages bar t, in the places of their turns. d: where the body begins. end_bar: bar t_end.
+    table, h, i: the method's table, the length of the step, the stage.
+    u (s, n): of the later stages bar t, in the places of their turns; of the first one bar t_end.
     """
-    bar = times(h * table[VECTORS, END_RATE, i], end_bar)
-    for m in range(i + 1, s):
-        w = h * table[BY_RATE, m, i]
-        if w != 0.0:
-            bar = plus(bar, times(w, vector_at(u[m], d + 3)))
-    return bar
+    end = u[0]
+    w = h * table[VECTORS, END_RATE, i]
+    for d in range(out.shape[0]):
+        out[index(d)] = w * end[index(d)]
+    for m in range(i + 1, u.shape[0]):
+        add_row(h * table[BY_RATE, m, i], u[m], out)
 
 
 @kernel
@@ -281,46 +290,53 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
 
     The turning parts of u and g of the stage behind j, which nobody reads any more, become bar t and bar omega. Until
     stage 0 comes, bar t_end waits in its place in u, which is 0 before and after; that of lam_q, from which it follows,
-    becomes the cotangent of the turn of the start by all that comes behind stage j.
+    becomes the cotangent of the turn of the start by all that comes behind stage j. What is summed over stages is so
+    for all bodies at once, as vectors; z is room for bar k until it is set.
     """
     s, n = u.shape
-    by_end = h * h * table[VECTORS, END, j]
-    by_end_rate = h * table[VECTORS, END_RATE, j]
-    for body in range(n // FREEDOMS):
-        c = COORDINATES * body
-        d = FREEDOMS * body
-        if j + 1 == s:
-            back = times(-1.0, _end_turn(table, s, h, q, v, c, d))
+    if j + 1 == s:
+        for body in range(n // FREEDOMS):
+            d = FREEDOMS * body
+            back = times(-1.0, _end_turn(table, s, h, q, v, COORDINATES * body, d))
             seen = vector_at(lam_q, d + 3)
             put(u[0], d + 3, turn_rate(back, seen))
             put(lam_q, d + 3, back_turned(back, seen))
-        else:
-            _stage_bars(table, h, j + 1, q, v, lam_q, u, g, c, d)
-        place = plus(times(by_end, vector_at(lam_q, d)), times(by_end_rate, vector_at(lam_v, d)))
-        turn = times(by_end_rate, vector_at(lam_v, d + 3))
-        for i in range(j + 1, s):
-            by_stage = h * h * table[BY_STAGE, i, j]
-            by_rate = h * table[BY_RATE, i, j]
-            if by_stage != 0.0 or by_rate != 0.0:
-                place = plus(place, plus(times(by_stage, vector_at(u[i], d)), times(by_rate, vector_at(g[i], d))))
-                turn = plus(turn, times(by_rate, vector_at(g[i], d + 3)))
-        put(z, d, place)
-        put(z, d + 3, turn)
-        if j == 0:  # its own turn is none, so bar omega_0 is bar k_0
-            add(lam_v, d + 3, _slope_bar(table, s, h, 0, u, d, vector_at(u[0], d + 3)))
-            put(u[0], d + 3, (0.0, 0.0, 0.0))
+    else:
+        _slope_bars(table, h, j + 1, u, z)
+        for body in range(n // FREEDOMS):
+            _stage_bars(j + 1, q, v, z, lam_q, u, g, COORDINATES * body, FREEDOMS * body)
+    if j == 0:
+        _slope_bars(table, h, 0, u, z)
+        for body in range(n // FREEDOMS):
+            put(u[0], FREEDOMS * body + 3, vector_at(z, FREEDOMS * body + 3))
+    by_end_rate = h * table[VECTORS, END_RATE, j]
+    by_end = h * h * table[VECTORS, END, j]
+    for d in range(n):
+        z[index(d)] = by_end * lam_q[index(d)]
+    for i in range(j + 1, s):
+        add_row(h * h * table[BY_STAGE, i, j], u[i], z)
+    for body in range(n // FREEDOMS):  # positions alone depend on accelerations in this way
+        put(z, FREEDOMS * body + 3, (0.0, 0.0, 0.0))
+    add_row(by_end_rate, lam_v, z)
+    for i in range(j + 1, s):
+        add_row(h * table[BY_RATE, i, j], g[i], z)
+    if j == 0:  # its own turn is none, so bar omega_0 is bar k_0
+        for body in range(n // FREEDOMS):
+            add(lam_v, FREEDOMS * body + 3, vector_at(u[0], FREEDOMS * body + 3))
+            put(u[0], FREEDOMS * body + 3, (0.0, 0.0, 0.0))
 
 
 @part
-def _stage_bars(table, h, i, q, v, lam_q, u, g, c, d):
+def _stage_bars(i, q, v, bars, lam_q, u, g, c, d):
     """Cotangents of a turn and a turning rate, in u and g (s, n) of stage i, become bar t and bar omega.
 
     u_i seen before the turn, exp(t) u_i = exp(t) J(t)^-T (J(t)^T u_i) = J(t)^-1 (J(t)^T u_i), is added to lam_q.
 
-    table, h, q (s, n_q), v (s, n), lam_q (n,): as of `stage_vjp`. c, d: where the body begins.
+    i: the stage. q (s, n_q), v (s, n), lam_q (n,): as of `stage_vjp`. bars (n,): of `_slope_bars`.
+    c, d: where the body begins.
     """
     t = turn_between(quaternion_at(q[0], c + 3), quaternion_at(q[i], c + 3))
-    bar = _slope_bar(table, u.shape[0], h, i, u, d, vector_at(u[0], d + 3))
+    bar = vector_at(bars, d + 3)
     own = turn_rate(times(-1.0, t), vector_at(u[i], d + 3))
     put(u[i], d + 3, plus(own, vector_rate_vjp(t, vector_at(v[i], d + 3), bar)))
     add(g[i], d + 3, vector_rate(times(-1.0, t), bar))
