@@ -26,7 +26,7 @@ NODES = 201
 FALLBACK = "the sweeps of the iterative method do not contract at t = {:.6g} s; direct was taken instead"
 
 
-def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: ResponseResult) -> Differentiated:
+def differentiate(method: str, driver: "Driver", alpha: FloatArray, result: ResponseResult) -> Differentiated:
     """Gradients of the rows that `driver.evaluate(alpha, ...)` found, by a method that is no part of that call.
 
     alpha: (N,). Counts are added to `driver.work`. Raises ValueError for any other name, and for a method that is not
@@ -37,32 +37,32 @@ def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: Resp
         raise ValueError(f"no sensitivity method {method!r} here")
     if kind.steps and not getattr(driver.method.kind, kind.steps):
         raise ValueError(f"the {method} method is defined on the steps of {', '.join(having(kind.steps))}")
-    found: Differentiated = resolve_name(kind.springs)(driver, alpha, looked)
+    found: Differentiated = resolve_name(kind.springs)(driver, alpha, result)
     return found
 
 
-def by_direct(driver: "Driver", alpha: FloatArray, looked: ResponseResult) -> Differentiated:
+def by_direct(driver: "Driver", alpha: FloatArray, result: ResponseResult) -> Differentiated:
     """Gradients carried forward with the motion, as of `differentiate`."""
     status, count = _run_again(driver, alpha)
-    gradients = np.zeros_like(looked.gradients)
+    gradients = np.zeros_like(result.gradients)
     if status is Status.OK:
-        _carry(driver, looked, count, gradients)
+        _carry(driver, result, count, gradients)
     return Differentiated(status, "", gradients)
 
 
-def by_iterative(driver: "Driver", alpha: FloatArray, looked: ResponseResult) -> Differentiated:
+def by_iterative(driver: "Driver", alpha: FloatArray, result: ResponseResult) -> Differentiated:
     """The same by fixed-point sweeps over implicit steps; by `direct` where these do not contract, which is told."""
     from mdstopo.sensitivity.springs_iterative import iterative
 
     status, count = _run_again(driver, alpha)
-    gradients = np.zeros_like(looked.gradients)
+    gradients = np.zeros_like(result.gradients)
     if status is not Status.OK:
         return Differentiated(status, "", gradients)
-    stopped = iterative(*_arguments(driver, looked, count, gradients, driver.work))
+    stopped = iterative(*_arguments(driver, result, count, gradients, driver.work))
     if stopped < 0:
         return Differentiated(Status.OK, "", gradients)
     message = FALLBACK.format(float(driver.room[stopped]))
-    _carry(driver, looked, count, gradients)
+    _carry(driver, result, count, gradients)
     return Differentiated(Status.OK, message, gradients)
 
 
@@ -78,22 +78,22 @@ def _run_again(driver: "Driver", alpha: FloatArray) -> tuple[Status, int]:
 
 
 def _arguments(
-    driver: "Driver", looked: ResponseResult, count: int, gradients: FloatArray, *more: Any
+    driver: "Driver", result: ResponseResult, count: int, gradients: FloatArray, *more: Any
 ) -> tuple[Any, ...]:
     """The arguments of a compiled entry, which fills the gradients; more: those behind what all of them begin with."""
     # the driver's own array of alpha: another one might be read-only, which would be another compilation
     return (
         driver.entry.TAG, driver.packed.ints, driver.packed.floats, driver.method.tables, driver._alpha,
         driver.scene.damped, driver.limits, count, driver.reductions, driver.room, driver.room_ints, driver.strength,
-        looked.rows, looked.found, gradients, *more,
+        result.rows, result.found, gradients, *more,
     )  # fmt: skip
 
 
-def _carry(driver: "Driver", looked: ResponseResult, count: int, gradients: FloatArray) -> None:
+def _carry(driver: "Driver", result: ResponseResult, count: int, gradients: FloatArray) -> None:
     """Fill the gradients by the direct method."""
     from mdstopo.sensitivity.springs_direct import direct
 
-    direct(*_arguments(driver, looked, count, gradients, np.zeros((0, gradients.shape[2])), driver.work))
+    direct(*_arguments(driver, result, count, gradients, np.zeros((0, gradients.shape[2])), driver.work))
 
 
 def histories(driver: "Driver", alpha: FloatArray) -> tuple[Status, FloatArray, FloatArray]:
@@ -112,11 +112,11 @@ def histories(driver: "Driver", alpha: FloatArray) -> tuple[Status, FloatArray, 
     return Status.OK, driver.room[: count + 1].copy(), lines
 
 
-def by_constant_load(driver: "Driver", alpha: FloatArray, looked: ResponseResult) -> Differentiated:
+def by_constant_load(driver: "Driver", alpha: FloatArray, result: ResponseResult) -> Differentiated:
     """Gradients with inertia and loads frozen at the times of the rows."""
     from mdstopo.sensitivity.springs_constant_load import constant_load
 
-    gradients = np.zeros_like(looked.gradients)
+    gradients = np.zeros_like(result.gradients)
     before = driver.work.copy()
     status, steps = driver.simulate(alpha)
     driver.work += before
@@ -124,8 +124,8 @@ def by_constant_load(driver: "Driver", alpha: FloatArray, looked: ResponseResult
         return Differentiated(status, "", gradients)
     start, end = float(steps.t[0]), float(steps.t[-1])
     for j, reduction in enumerate(driver.reductions.tolist()):
-        for r in range(int(looked.found[j])):
-            times, weights = looked.rows[j, r, :1], np.ones(1)
+        for r in range(int(result.found[j])):
+            times, weights = result.rows[j, r, :1], np.ones(1)
             if reduction in (MEAN, INTEGRAL):
                 times = np.linspace(start, end, NODES)
                 weights = np.full(NODES, (end - start) / (NODES - 1))
