@@ -16,7 +16,7 @@ from mdstopo.optimizer.problem import Bools, Floats, Ints, Sample, largest_of_gr
 from mdstopo.optimizer.stack import Slopes, Stack, alike, joined, slopes_of, steepest_of
 from mdstopo.optimizer.wide_numbers import WIDE
 
-#: numbers that the rows may take, and rows that are kept at least and at most; of very many variables the least
+#: numbers that the rows may take, and the room for rows at least and at most, in rows; of very many variables the least
 ROOM, LEAST, MOST = 2e7, 8, 160
 #: a row within this of another of its group, in slope and in value relative to the steepest, is the same
 SAME = 1e-9
@@ -180,13 +180,43 @@ class Bundle:
         return self.subset(~seen.any(axis=1))
 
     def thinned(self) -> "Bundle":
-        """At most as many rows as there is room for: the iterate's own, those that were used last, the newest."""
-        n = max(self.slope.shape[1], 1)
-        most = LEAST if n >= WIDE else int(min(max(ROOM / n, LEAST), MOST))
-        if len(self) <= most:
+        """The iterate's own rows, and as many others as there is room for: those that carried a multiplier last, and of
+        these the newest.
+
+        Beside many own rows half of the room is for others: a trial that fails is to be known by the next one. Of very
+        many variables own rows may take all of it.
+        """
+        most, wide = self._room(), self.slope.shape[1] >= WIDE
+        others = np.flatnonzero(~self.own)
+        room = max(most - (len(self) - len(others)), 0 if wide else most // 2)
+        if len(others) <= room:
             return self
-        order = np.lexsort((-np.arange(len(self)), self.age, ~self.own))
-        return self.subset(np.sort(order[: max(most, int(self.own.sum()))]))
+        kept = self.own.copy()
+        kept[others[np.lexsort((-others, self.age[others]))[:room]]] = True
+        return self.subset(kept)
+
+    def with_rejected(self, seen: "Bundle", below: Floats) -> "Bundle":
+        """These rows with those of a rejected trial, seen from the iterate, as the newest ones that are not its own.
+
+        A quarter of the room is for one trial's, those nearest to carrying a multiplier there. below (K,): how far each
+        is from that, as `Bundle.below` tells it.
+        """
+        most = max(self._room() // 4, LEAST)
+        nearest = np.sort(np.argsort(below, kind="stable")[:most])
+        return self.subset(~self.own).joined(seen.subset(nearest)).joined(self.subset(self.own))
+
+    def below(self) -> Floats:
+        """How far each row (K,) is from carrying a multiplier, in steps of its steepest variable: below the highest of
+        its group, or below the limit."""
+        groups = int(self.group.max(initial=0)) + 1
+        levels = self.levels(groups)
+        levels[1:] = np.maximum(levels[1:], 0.0)
+        return np.asarray((levels[self.group] - self.values()) / np.maximum(self.steepest, 1e-300))
+
+    def _room(self) -> int:
+        """How many rows there is room for."""
+        n = max(self.slope.shape[1], 1)
+        return LEAST if n >= WIDE else int(min(max(ROOM / n, LEAST), MOST))
 
     def aged(self, multipliers: Floats, enough: Floats) -> "Bundle":
         """The rows after a subproblem with multipliers (K,), with new ages; enough (groups,): the least that counts."""

@@ -105,7 +105,7 @@ class BundleMethod:
             state.penalty = np.zeros(0)
         else:
             state.penalty = self.first_penalty(rows)
-        state.concavity = np.zeros(len(state.penalty) + 1)
+        state.concavity = _carried_over(state.concavity, len(state.penalty) + 1)
         state.stagnation, state.violation_mark = 0, float("inf")
         state.kkt = float("nan")
 
@@ -171,7 +171,7 @@ class BundleMethod:
                 state.resets = 0
         else:
             null_step = _is_null_step(seen, here, new.values(), there)
-            state.bundle = seen.joined(state.bundle)
+            state.bundle = state.bundle.with_rejected(seen, new.below())
             state.trust = NULL_STEP_SHRINK * state.trust if null_step else SHRINK * min(state.trust, size)
         state.bundle = state.bundle.without_repeats().thinned()
         if accepted:
@@ -289,6 +289,19 @@ class BundleMethod:
             some = rows.distance > 0.0
             over = (rows.values() - levels[rows.group])[some] / rows.distance[some] ** 2
             np.maximum.at(state.concavity, rows.group[some], over)
+
+
+def _carried_over(concavity: Floats, groups: int) -> Floats:
+    """What was seen of how groups bend downwards, where the method begins anew with so many groups.
+
+    The largest violation is taken to bend as the constraint that bends most, and constraints as the largest violation
+    did: rows that were seen far away would else stop what is possible until all of it has been seen once more.
+    """
+    if groups == len(concavity):
+        return concavity
+    if groups == 1:
+        return np.array([concavity[1:].max()])
+    return np.concatenate([[0.0], np.full(groups - 1, concavity[0])])
 
 
 def _steepness_of_highest(own: Bundle) -> float:

@@ -25,9 +25,10 @@ from mdstopo.optimizer.nearest_feasible import repair
 from mdstopo.optimizer.problem import Floats, LinearRows, largest_of_groups
 from mdstopo.optimizer.stack import Slopes, Stack, joined
 
-#: what violations cost, in multipliers; the least share of the violation that could go which has to go; the factor on
-#: penalties until it does, and how often
-MARGIN, STEER, RAISE, RAISES = 2.0, 0.3, 5.0, 8
+#: what violations cost, in multipliers: what is beyond one of them is the merit's alone, and makes steps along a curved
+#: limit short; the least share of the violation that could go which has to go; the factor on penalties until it does,
+#: and how often
+MARGIN, STEER, RAISE, RAISES = 1.2, 0.3, 5.0, 8
 #: steps that curvature is learnt from, where B is a matrix and where it is not
 STEPS, FEW_STEPS = 60, 12
 #: the least curvature, of the largest gradient entry over the range

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.bundle import MOST, Bundle
+from mdstopo.optimizer.bundle_method import PATIENCE
 from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import Sample
@@ -198,3 +199,76 @@ def test_of_too_many_rows_those_go_that_have_not_been_used(monkeypatch):
     thinned = many.thinned()
     assert len(thinned) == 8
     assert 3.0 not in thinned.values()
+
+
+def test_beside_many_own_rows_there_is_room_for_what_trials_have_shown():
+    """More own rows than there is room for: others stay that carried a multiplier last, and the newest of them."""
+    rng = np.random.default_rng(2)
+    many = MOST + 20
+    own = Bundle.of(Sample(1.0, rng.uniform(-1.0, 1.0, many), rng.normal(size=(many, 3))), np.arange(many))
+    lows = np.linspace(0.9, -3.0, MOST)
+    seen = Bundle.of(Sample(0.9, lows, np.tile([0.0, 0.0, 2.0], (MOST, 1))), np.arange(MOST)).moved(np.zeros(3), 0.1)
+    seen.age[-5:] = 1
+    kept = seen.joined(own).thinned()
+    assert int(kept.own.sum()) == many
+    assert kept.subset(~kept.own).values() == pytest.approx(lows[-5 - MOST // 2 : -5])
+    few = seen.joined(own.subset(np.arange(8))).thinned()
+    assert len(few) == MOST
+    assert few.subset(~few.own).values() == pytest.approx(lows[3:-5])
+
+
+def test_of_a_rejected_trial_those_rows_enter_that_are_nearest_to_what_stood_in_the_way():
+    """Rows of an objective, of a limit that is broken and of one that holds: by what is missing, over the slope."""
+    gradients = np.array([[2.0, 0.0], [0.0, 1.0]])
+    sample = Sample(
+        3.0, np.array([3.0, 1.0]), gradients, np.array([0.5, 0.1, -0.3]), np.ones((3, 2)), np.array([0, 0, 1])
+    )
+    trial = Bundle.of(sample, np.arange(2))
+    assert trial.below() == pytest.approx([0.0, 2.0, 0.0, 0.4, 0.3])
+    n = MOST // 4 + 3
+    many = Bundle.of(Sample(0.0, -np.arange(float(n)), np.ones((n, 2))), np.arange(n))
+    before = Bundle.of(Sample(5.0, np.array([5.0, 4.0]), gradients), np.arange(2))
+    before.own[0] = False
+    joined = before.with_rejected(many.moved(np.zeros(2), 0.1), many.below()[::-1])
+    assert joined.values().tolist() == [5.0, *(-np.arange(3.0, n)), 4.0]
+    assert joined.own.tolist() == [False] * (n - 2) + [True]
+
+
+@pytest.mark.parametrize(("steepness", "most"), [(0.0, 12), (10.0, 100)])
+def test_steps_along_a_curved_limit_are_not_made_short_by_what_they_violate(steepness, most):
+    """The example of N. Maratos (1978), whose good steps raise objective and violation both. The optimum is (1, 0)."""
+
+    def limits(x):
+        return np.array([x @ x - 1.0, 1.0 - x @ x]), np.stack([2.0 * x, -2.0 * x])
+
+    def objective(x):
+        return np.array([steepness * (x @ x - 1.0) - x[0]]), (2.0 * steepness * x - [1.0, 0.0])[None]
+
+    problem = Toy(objective, [np.cos(2.0), np.sin(2.0)], -2.0, 2.0, constraints=limits)
+    problem.competes = True
+    state = ended(problem, tolerance=1e-8)
+    assert state.status is RunStatus.CONVERGED
+    assert state.best_alpha == pytest.approx([1.0, 0.0], abs=1e-4)
+    assert len(problem.evaluated) <= most
+
+
+def test_what_was_seen_to_bend_is_known_while_limits_are_restored_and_after():
+    problem = Toy(
+        lambda x: (x[:1].copy(), np.array([[1.0, 0.0]])), [1.0, 1.0], -2.0, 2.0,
+        constraints=lambda x: (np.array([x[0] + 1.0, x[1] + 1.0]), np.eye(2)),
+    )  # fmt: skip
+    problem.competes = True
+    optimizer = Gsao(problem, settings())
+    state = optimizer.start()
+    state.concavity = np.array([7.0, 0.5, 2.0])
+    method = optimizer.bundle
+    state.small = PATIENCE
+    assert method.begin_anew(state, stuck=True)
+    assert state.restoring
+    assert state.concavity.tolist() == [2.0]
+    state.concavity = np.array([3.0])
+    state.violation = 0.0
+    state.constraint_rows = -np.ones(2)
+    assert method.begin_anew(state, stuck=False)
+    assert not state.restoring
+    assert state.concavity.tolist() == [0.0, 3.0, 3.0]
