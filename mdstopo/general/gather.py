@@ -129,7 +129,12 @@ def fill_poses(model, history, o, carries, rel):
 
 @kernel
 def pose_carriers(model, carries, turned, q, v, rel):
-    """Set rel (n_pair, POSE) of the pairs with carries (n_pair,), from attitudes, coordinates and velocities."""
+    """Compute relative poses of the pairs that carry more than joints, at one state.
+
+    model: the compiled scene. carries (n_pair,): of `switches.carriers`.
+    turned (n_body, A): attitudes of the bodies. q (n_q,), v (n,): coordinates and velocities.
+    rel (n_pair, POSE): out.
+    """
     for p in range(rel.shape[0]):
         if carries[p] != 0:
             turned_pose(model, p, turned, q, v, rel)

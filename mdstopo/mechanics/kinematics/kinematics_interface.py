@@ -72,7 +72,7 @@ class Kinematics:
 
     @property
     def load_slopes(self) -> int:
-        """Whether loads change with the coordinates of bodies; `load_slopes`, called from Python."""
+        """How many slopes of its loads a body has; `load_slopes`, called from Python."""
         return int(self.kernels["load_slopes"].py_func(None))
 
     def retract(self, q: FloatArray, shift: FloatArray) -> FloatArray:

@@ -111,7 +111,7 @@ def rotations(model):
 
 @part
 def load_slopes(model):
-    """Whether loads change with coordinates: in a plane those fixed to a body turn with its angle."""
+    """One slope of its loads a body: loads that are fixed to a body turn with its angle."""
     return ROTATIONS
 
 
