@@ -272,15 +272,15 @@ def push(
     sets_bar = np.zeros((stages, slots))
     begin(model, history, first, step, states, sets)
     drops = np.empty(0)
-    looked = which[0, 0] if integral > 0 else np.int64(-1)
+    integrated = which[0, 0] if integral > 0 else np.int64(-1)
     found = False  # whether the map of the whole step in hand is there
     r = 0
     if integral > 0:
         integral_cotangents(
-            tag, model, tables, member_state, history, count, looked, integral == 2, bars, rows_bar, sets_bar,
+            tag, model, tables, member_state, history, count, integrated, integral == 2, bars, rows_bar, sets_bar,
             np.empty(0), workspace, padded[0], work,
         )  # fmt: skip
-        drops = event_drops(model, member_state, history, count, looked, integral == 2, workspace)
+        drops = event_drops(model, member_state, history, count, integrated, integral == 2, workspace)
     else:
         while r < rows.shape[0] and _step_of(rows[r]) < 0:
             add_row(
@@ -289,7 +289,7 @@ def push(
             )  # fmt: skip
             r += 1
     if model.varied.shape[0] > 0 and (integral > 0 or r < rows.shape[0]):
-        shift_times(model, history, member_state, count, np.int64(0), looked, integral == 2, step.place, states)
+        shift_times(model, history, member_state, count, np.int64(0), integrated, integral == 2, step.place, states)
     for k in range(count):
         if integral == 0 and r == rows.shape[0]:
             break
@@ -311,7 +311,7 @@ def push(
         ):
             return k
         through_step(model, member_state, history, k, step, sets_bar[o:end], fresh, states, sets, work)
-        jump(model, history, member_state, count, k + 1, step, states, sets, drops, looked, integral == 2)
+        jump(model, history, member_state, count, k + 1, step, states, sets, drops, integrated, integral == 2)
     for m in range(padded.shape[0]):
         if integral > 0:
             add_share(1.0, states[states.shape[0] - 1], padded[m])
@@ -513,7 +513,7 @@ def numbers_through_step(model, ints, shifted, apart, member_state, history, w, 
 
 @entry
 def follow(
-    tag, ints, floats, tables, alpha, limits, count, looked, at, who, shifted, apart, with_alpha, room, room_ints,
+    tag, ints, floats, tables, alpha, limits, count, responses, at, who, shifted, apart, with_alpha, room, room_ints,
     member_state, padded, out, first, work,
 ):  # fmt: skip
     """dg/d(design) of responses at states, the time held fixed; at events the derivatives of the values before them.
@@ -524,7 +524,7 @@ def follow(
       alpha (N,): the design.
       limits, room, room_ints: the history of steps, as of `carve_history`.
       count: how many steps there are.
-      looked (R,): the responses. at (K,): the states, rising.
+      responses (R,): which ones. at (K,): the states, rising.
       who (R, K): the member whose force is meant.
       shifted (B, 2, L), apart (B,): for each of B numbers the floats of the packed scene with a larger and with a
         smaller one, and by how much these differ; only masses, loads and velocities at the start may depend on it.
@@ -579,11 +579,11 @@ def follow(
             through_step(model, member_state, history, k - 1, step, no_sets, fresh, states, sets, work)
             numbers_through_step(model, ints, shifted, apart, member_state, history, k - 1, step, states, f, slope)
         while place < at.shape[0] and at[place] == k:
-            for r in range(looked.shape[0]):
+            for r in range(responses.shape[0]):
                 row[WHO] = who[r, place]
                 row_cotangents(
-                    tag, model, tables, member_state, history, count, looked[r], row, np.bool_(False), workspace, bars,
-                    bar_set, padded, work,
+                    tag, model, tables, member_state, history, count, responses[r], row, np.bool_(False), workspace,
+                    bars, bar_set, padded, work,
                 )  # fmt: skip
                 add_at_state(step.place, bars, bar_set, states, sets, padded)
                 if numbers > 0:
