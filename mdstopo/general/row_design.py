@@ -55,7 +55,6 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
       work (WORK,): counts of work, added to.
     """
     count = z.shape[0]
-    work[DESIGN_STATES] += stages * count
     n_pair = model.pair.shape[0]
     rel = poses_of_stages(model, history, o, stages)
     u = np.empty((count, stages, n_pair, freedoms(model)))
@@ -67,7 +66,7 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
                     pair_displacement(model, rel[j], p, z[m, j], u[m, j, p])
                     for i in range(freedoms(model)):
                         u[m, j, p, i] = -u[m, j, p, i]
-    add_members_of_rows(model, segment, history, o, member_state, rel, u, out)
+    add_members_of_rows(model, segment, history, o, member_state, rel, u, out, work)
     for k in range(model.block.shape[0]):
         if model.block[k, CODE] == INERTER and model.block[k, DESIGN] >= 0 and model.active[segment, k] != 0:
             for j in range(stages):
@@ -81,7 +80,7 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
 
 
 @kernel
-def add_members_of_rows(model, segment, history, o, member_state, rel, u, out):
+def add_members_of_rows(model, segment, history, o, member_state, rel, u, out, work):
     """Add the derivatives by alpha^mu of all design members but inerters at the stages of one step: sum f (b . u).
 
     Constant:
@@ -94,8 +93,10 @@ def add_members_of_rows(model, segment, history, o, member_state, rel, u, out):
       u (R, S or more, n_pair, D): virtual changes of these for each row, with their signs turned.
     Out:
       out (R, M_padded or more): derivatives by alpha^mu of each row, added to.
+      work (WORK,): counts of work, added to.
     """
     stages = rel.shape[0]
+    work[DESIGN_STATES] += stages * u.shape[0]
     room = np.empty(4 * stages * lanes())
     longest = 0
     for k in range(model.block.shape[0]):

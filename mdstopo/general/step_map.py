@@ -289,7 +289,7 @@ def add_forces(model, history, w, member_state, step, by_force, by_pose, out, wo
     if by_pose.shape[0] == 0:
         add_designs_of_rows(model, segment, history, o, s, member_state, by_force, out, work)
     else:
-        add_members_of_rows(model, segment, history, o, member_state, step.rel[:s], by_pose, out)
+        add_members_of_rows(model, segment, history, o, member_state, step.rel[:s], by_pose, out, work)
 
 
 @kernel
