@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mdstopo.compiler.fields import Field, Fields, views_of
-from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.compiler.threads import shared, taken
 from mdstopo.general.general_model import INERTER, MEMBER_EXCESS, MEMBER_FREE_LENGTH, unpack_general
 from mdstopo.general.members import MODE
@@ -85,8 +85,8 @@ ARRAYS = (
     "pose", "change", "pose_a", "energy", "when", "level", "step", "step_time", "node_pose", "node_a", "node_change",
     "node_level", "node_energy",
 )  # fmt: skip
-#: the sequence of modes that a member goes through is a number with so many digits
-MODES = 64
+#: by what the number of the modes so far is multiplied before the next one is added: odd, so that none is forgotten
+SPREAD = 6364136223846793005
 #: states of one pass over a tile, whose poses stay in the nearest cache
 AT_ONCE = 32
 
@@ -267,7 +267,7 @@ def _price_tile(model, candidates, grids, i, j, error, scratch, price):
 
     Returns how many prices were computed.
     """
-    plan, level, rows, columns, index, asked, trace, room = scratch
+    plan, level, rows, columns, index, asked, trace, buffer = scratch
     begin_tile(error, plan, level)
     while ask(grids, i, j, plan, level, rows, columns):
         wide = plan[COLUMNS]
@@ -277,7 +277,7 @@ def _price_tile(model, candidates, grids, i, j, error, scratch, price):
                 index[0, a * wide + b] = i * TALL + rows[a]
                 index[1, a * wide + b] = j * BROAD + columns[b]
         _price(model, candidates, index, count, wide, asked, trace)
-        take(grids, i, j, error, plan, level, rows, columns, asked, trace, room, price)
+        take(grids, i, j, error, plan, level, rows, columns, asked, trace, buffer, price)
     return plan[ASKED]
 
 
@@ -388,13 +388,18 @@ def _price_switching(model, candidates, k, count, price, trace):
     node = np.empty((NODE_ROWS, NODES))
     pieces = np.empty((CHANGES + 1, PIECE))
     for i in range(count):
-        found, modes = _price_followed(model, candidates, k, i, node, pieces)
+        found, trace[i] = _price_followed(model, candidates, k, i, trace[i], node, pieces)
         price[i] += found
-        trace[i] = MODES * trace[i] + modes
+
+
+@part
+def with_mode(modes, mode):
+    """The number of a sequence of modes that goes on with one more; with -1 where another law or scene begins."""
+    return SPREAD * modes + (mode + 2)
 
 
 @kernel
-def _price_followed(model, candidates, k, i, node, pieces):
+def _price_followed(model, candidates, k, i, modes, node, pieces):
     """What member i of a law that switches does in the steps of a run.
 
     A step in which it stays in its mode is summed over its stages, as for a member that is built. In a step in which
@@ -404,11 +409,12 @@ def _price_followed(model, candidates, k, i, node, pieces):
     In:
       model: with the members.
       candidates, k, i: a `PricedCandidates`, the number of the run, and the member.
+      modes: the number of those that it has gone through in the runs before.
     Scratch:
       node (NODE_ROWS, NODES): the member at the nodes of a step.
       pieces (CHANGES + 1, PIECE): pieces of a step in which it stays in a mode.
 
-    Returns its part of the derivative by alpha, and the modes that it goes through, as a number.
+    Returns its part of the derivative by alpha, and the number of the modes with those of this run.
     """
     run = candidates.run[k]
     p = candidates.law[k]
@@ -419,7 +425,7 @@ def _price_followed(model, candidates, k, i, node, pieces):
     kept = 0.0
     begun = run[FROM_START] == 0  # a law that acts later begins in mode 0, unset
     total = 0.0
-    modes = np.int64(0)
+    modes = with_mode(modes, -1)
     told = -1
     pieces[0, PIECE_MODE] = 0.0
     pieces[0, PIECE_SET] = 0.0
@@ -459,7 +465,7 @@ def _price_followed(model, candidates, k, i, node, pieces):
         for at in range(last + 1):
             own_mode = int(pieces[at, PIECE_MODE])
             if step[KIND] == WHOLE and own_mode != told:
-                modes = MODES * modes + own_mode + 1
+                modes = with_mode(modes, own_mode)
                 told = own_mode
         if last == 0:
             if law_is_idle(code, mode):

@@ -339,7 +339,7 @@ def _price_tile(points, grids, i, j, common, kind, states, member, scratch, pric
 
     Returns how many prices were computed.
     """
-    plan, level, rows, columns, _, asked, trace, room = scratch
+    plan, level, rows, columns, _, asked, trace, buffer = scratch
     error = common[ERROR]
     near = np.empty(2)
     trace[:] = 0
@@ -353,7 +353,7 @@ def _price_tile(points, grids, i, j, common, kind, states, member, scratch, pric
             np.int64(0), np.int64(0), count, block_of(kind, count, wide if kind == 0 else 0), near, member, states[0],
             states[1], states[2], asked,
         )  # fmt: skip
-        take(grids, i, j, error, plan, level, rows, columns, asked, trace, room, price)
+        take(grids, i, j, error, plan, level, rows, columns, asked, trace, buffer, price)
     return plan[ASKED]
 
 

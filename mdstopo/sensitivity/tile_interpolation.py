@@ -106,7 +106,7 @@ def extent(grids, i, j):
 
 @part
 def make_scratch():
-    """What pricing of a tile needs: plan, level, rows, columns, index (2, PLACES), asked, trace, room."""
+    """What pricing of a tile needs: plan, level, rows, columns, index (2, PLACES), asked, trace, buffer."""
     return (
         np.zeros(PLAN, np.int64),
         np.zeros(PARTS, np.int64),
@@ -206,7 +206,7 @@ def _put_off(level, smallest, size, to):
 
 
 @kernel
-def take(grids, i, j, error, plan, level, rows, columns, asked, trace, room, price):
+def take(grids, i, j, error, plan, level, rows, columns, asked, trace, buffer, price):
     """Take the prices that `ask` has asked for.
 
     In:
@@ -218,7 +218,7 @@ def take(grids, i, j, error, plan, level, rows, columns, asked, trace, room, pri
     In place:
       plan (PLAN,), level (PARTS,): as of `ask`.
     Scratch:
-      room (COLUMN_NODES + TALL, BROAD).
+      buffer (COLUMN_NODES + TALL, BROAD).
     Out:
       price (PLACES,): of the tile, where it is known now.
     """
@@ -255,13 +255,13 @@ def take(grids, i, j, error, plan, level, rows, columns, asked, trace, room, pri
         if not worst <= error:
             plan[EVERY_ROW] = 1
             return
-        _along_rows(grids[0], i, row_node, row_weight, asked, room[COLUMN_NODES:])
+        _along_rows(grids[0], i, row_node, row_weight, asked, buffer[COLUMN_NODES:])
     else:
         for a in range(height):
             for b in range(COLUMN_NODES):
-                room[COLUMN_NODES + a, b] = asked[a * wide + b]
-    _along_columns(grids[1], j * BROAD + plan[BEGIN], size, node, weight, room)
-    _spread(room, extent(grids, i, j)[0], plan[BEGIN], size, price)
+                buffer[COLUMN_NODES + a, b] = asked[a * wide + b]
+    _along_columns(grids[1], j * BROAD + plan[BEGIN], size, node, weight, buffer)
+    _spread(buffer, extent(grids, i, j)[0], plan[BEGIN], size, price)
     _put_off(level, smallest, size, DONE)
 
 
@@ -372,21 +372,21 @@ def _along_columns(numbers, first, size, node, weight, out):
 
 
 @kernel
-def _spread(room, height, begin, size, price):
+def _spread(buffer, height, begin, size, price):
     """Write the prices of a part of a tile.
 
     In:
-      room (COLUMN_NODES + TALL, BROAD): shares of the nodes by columns; then values of each row at these nodes.
+      buffer (COLUMN_NODES + TALL, BROAD): shares of the nodes by columns; then values of each row at these nodes.
       height, begin, size: rows of the part, its first column, and how many it has.
     Out:
       price (PLACES,): set there.
     """
     for a in range(height):
-        own = room[COLUMN_NODES + a]
+        own = buffer[COLUMN_NODES + a]
         for b in range(0, size, lanes()):
             value = zero()
             for k in range(COLUMN_NODES):
-                value += own[k] * load(room[k], b)
+                value += own[k] * load(buffer[k], b)
             store(price, a * BROAD + begin + b, value)
 
 

@@ -49,14 +49,14 @@ def tile(grids, function, chosen=None, error=ERROR, modes=lambda p, q: np.zeros(
     """All values of the first tile, of one that is worth `error`; and how many were computed."""
     chosen = chosen or (np.arange(len(grids[0])), np.arange(len(grids[1])))
     known = smoothness(grids, chosen)
-    plan, level, rows, columns, _, asked, trace, room = make_scratch.py_func()
+    plan, level, rows, columns, _, asked, trace, buffer = make_scratch.py_func()
     price = np.full(PLACES, np.inf)
     begin_tile(error, plan, level)
     while ask(known, 0, 0, plan, level, rows, columns):
         i, j = np.repeat(rows[: plan[ROWS]], plan[COLUMNS]), np.tile(columns[: plan[COLUMNS]], plan[ROWS])
         asked[: len(i)] = function(grids[0][i], grids[1][j])
         trace[: len(i)] = modes(grids[0][i], grids[1][j])
-        take(known, 0, 0, error, plan, level, rows, columns, asked, trace, room, price)
+        take(known, 0, 0, error, plan, level, rows, columns, asked, trace, buffer, price)
     return price.reshape(TALL, BROAD), int(plan[ASKED])
 
 
