@@ -152,32 +152,41 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         self, states: PricingStates, common: FloatArray, which: IndexArray, out: FloatArray, prices: FloatArray
     ) -> None:
         """See `CandidatePass.fill_tiles`."""
-        packed = (*self._room(states), *self._packed(states, self.chosen))
-        kernels.price_tiles(*packed, *self.smoothness, common, *self.by_tile, which, allowed(), out, prices)
+        packed = (*self._packed_scene(states), *self._packed(states, self.chosen))
+        kernels.price_tiles(*packed, *self.smoothness(states), common, *self.by_tile, which, allowed(), out, prices)
 
     def prices_between(self, states: PricingStates, a: IndexArray, b: IndexArray) -> FloatArray:
         """The derivatives (K,) by alpha of members from first points to second ones."""
         if self._last is None or self._last[0] is not states:
             self._last = states, self._packed(states, (slice(None), slice(None)))
-        found, room = np.empty(len(a)), self._room(states)
+        found, scene = np.empty(len(a)), self._packed_scene(states)
         for start in range(0, len(a), PLACES):
             part = slice(start, start + PLACES)
             places = np.stack([a[part], b[part]]).astype(np.int64)
             out = np.empty(places.shape[1])
-            kernels.price_places(*room, *self._last[1], places, out)
+            kernels.price_places(*scene, *self._last[1], places, out)
             found[part] = out
         return found
+
+    def grids(self, states: PricingStates) -> list[tuple[FloatArray, FloatArray]]:
+        """See `CandidatePass.grids`: mirror images and scenes may have other points."""
+        found = {}
+        for scene in states.scenes:
+            for place in self._places:
+                _, _, first, second, _, _ = self._points(scene, place, self.chosen)
+                found[first.tobytes(), second.tobytes()] = first.T, second.T
+        return list(found.values())
 
     def error(self, states: PricingStates) -> float:
         """The largest error of a price in a pass, relative to the largest price."""
         switches = any(scene.steps is not None for scene in states.scenes)
         return SWITCHING_ERROR if switches else SMOOTH_ERROR
 
-    def _room(self, states: PricingStates) -> tuple[IndexArray, FloatArray]:
+    def _packed_scene(self, states: PricingStates) -> tuple[IndexArray, FloatArray]:
         """A packed scene with room for the members of a tile, and for the numbers of any of the scenes' laws."""
         scene, model = states.scenes[0].scene, states.scenes[0].model
         segments = len(model.active)
-        room = model._replace(
+        with_tile = model._replace(
             block=np.zeros((1, ROW + 1), dtype=np.int64),
             law=np.zeros((1, model.law.shape[1])),
             active=np.ones((segments, 1), dtype=np.int64),
@@ -186,7 +195,7 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             member=np.zeros((len(model.member), PLACES)),
             curves=np.zeros(_most_curves(states)),
         )
-        return pack_general(room, scene.kinematics)
+        return pack_general(with_tile, scene.kinematics)
 
     def _packed(
         self, states: PricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]

@@ -5,6 +5,7 @@ single candidates (`sensitivity.springs_pricing`, `general.general_pricing`).
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -79,6 +80,7 @@ class CandidatePass(ABC, Generic[A]):
         self.homes = homes[self.order]
         self._built = (group.from_index, group.to_index)[self.order]
         self.chosen = spread(len(self.homes[0]), len(self.homes[1]), count)
+        self._smooth: tuple[A, tuple[FloatArray, FloatArray, IndexArray, IndexArray]] | None = None
 
     @abstractmethod
     def fill_tiles(self, states: A, common: FloatArray, which: IndexArray, out: FloatArray, prices: FloatArray) -> None:
@@ -149,11 +151,17 @@ class CandidatePass(ABC, Generic[A]):
         common[WORTH], common[UPPER] = worth, self.upper
         return common
 
-    @cached_property
-    def smoothness(self) -> tuple[FloatArray, FloatArray, IndexArray, IndexArray]:
+    def grids(self, states: A) -> Sequence[tuple[FloatArray, FloatArray]]:
+        """The points that are priced, (n_A, d) and (n_B, d), once for each way in which they lie: those of `homes`."""
+        return [(self.homes[0][self.chosen[0]], self.homes[1][self.chosen[1]])]
+
+    def smoothness(self, states: A) -> tuple[FloatArray, FloatArray, IndexArray, IndexArray]:
         """Which parts of the tiles may be priced by a few of their candidates (`tile_interpolation.smoothness`)."""
-        rows, columns = self.chosen
-        return smoothness((self.homes[0][rows], self.homes[1][columns]), self.chosen)
+        if self._smooth is None or self._smooth[0] is not states:
+            found = [smoothness(each, self.chosen) for each in self.grids(states)]
+            rows, columns = (np.min([each[k] for each in found], axis=0) for k in (2, 3))
+            self._smooth = states, (*found[0][:2], rows, columns)
+        return self._smooth[1]
 
     def _lengths(self, a: IndexArray, b: IndexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """The lengths (K,) of candidates from first points to second ones (m), and whether there are such."""

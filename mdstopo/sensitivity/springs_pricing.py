@@ -124,7 +124,7 @@ class SpringCandidates(CandidatePass[SpringPricingStates]):
         first, second, first_home, second_home = (np.ascontiguousarray(each.T) for each in ends)
         pose, change, weight = states.of_pair(self.pair)
         kernels.price_candidates(
-            first, second, first_home, second_home, *self.smoothness, common, self._kind, pose, change, weight,
+            first, second, first_home, second_home, *self.smoothness(states), common, self._kind, pose, change, weight,
             *self.by_tile, which, allowed(), out, prices,
         )  # fmt: skip
 

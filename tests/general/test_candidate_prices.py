@@ -332,6 +332,30 @@ def test_a_dense_pass_computes_few_of_the_prices_and_knows_all(law, width, error
     assert_dense_pass_is_right(candidates, states, np.abs(sample).max(), error)
 
 
+def test_a_dense_pass_knows_the_points_of_mirror_images():
+    """The images of evenly spread points are so, too, but for one."""
+    scene = arm({**SPRING, "damping": 7})
+    evenly = np.linspace([0.9, -0.3], [0.91, -0.31], BROAD)
+    elsewhere = evenly - [0.05, 0.02]
+    elsewhere[57] += [0.02, -0.1]
+    ground = {"grid": {"line": {"from": [1.2, -1.1], "to": [1.204, -1.1], "count": 2 * TALL}}}
+    scene["points"] = {
+        "p": {"body": "foot", "grid": {"list": evenly.tolist()}}, "q": {"body": "ground", **ground},
+        "p2": {"body": "foot", "grid": {"list": elsewhere.tolist()}}, "q2": {"body": "ground", **ground},
+    }  # fmt: skip
+    scene["members"]["web"]["cost"] = 1
+    scene["members"]["image"] = {**scene["members"]["web"], "from": "p2", "to": "q2"}
+    scene["design"]["mirrored"] = [["web", "image"]]
+    case = read_case(json.dumps({"format": 1, **scene, "solver": {"step": STEP, "integrator": "runge_kutta"}}))
+    evaluator = Evaluator(case)
+    problem = evaluator.problem()
+    evaluation = problem.evaluation(np.full(case.space.size, 0.2))
+    states = problem.pricing_states(evaluation, np.ones(len(problem.sample_of(evaluation).rows)))
+    candidates = evaluator.candidates_of(case.members[0])
+    sample = candidates.prices(states, *np.divmod(np.arange(case.members[0].candidates.count), 2 * TALL))
+    assert_dense_pass_is_right(candidates, states, np.abs(sample).max(), 1e-12)
+
+
 @pytest.mark.parametrize(("first", "second"), [((0, 1), (1, 0)), ((0,), (1,)), ((), (0,))])
 def test_a_sequence_of_modes_has_a_number_of_its_own(first, second):
     """However many changes follow: two members that rattle alike in the end need not have begun alike."""
