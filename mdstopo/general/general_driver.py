@@ -139,7 +139,7 @@ class GeneralDriver:
         self.jumps: dict[int, list[tuple[float, FloatArray]]] = {}
         #: where the steps of the last evaluation had to end
         self.quadrature_breakpoints: list[float] = []
-        self._inertial = bool(np.any(model.block[:, 3] == INERTER))
+        self._inertial = bool(np.any(model.block[:, CODE] == INERTER))
         self._entry: Entries | None = None
         self._message = ""
         self._allowed = MAX_STEPS
@@ -187,8 +187,8 @@ class GeneralDriver:
         rated = (model.block[:, CODE] != SPRING) | (model.law[:, DAMPING] != 0.0)
         varied = model.varied[:, VARIED_PLACE] == DAMPING
         bushed = model.bushing[:, -self.scene.kinematics.freedoms :] != 0.0
-        alike = not (np.any(rated) or np.any(varied) or np.any(bushed) or len(model.contact_pair))
-        return not self._is_planar and alike
+        damped = np.any(rated) or np.any(varied) or np.any(bushed) or len(model.contact_pair) > 0
+        return not (self._is_planar or damped)
 
     def allow(self, steps: int) -> None:
         """Limit the number of steps of a run; one that needs more ends with STEP_LIMIT."""

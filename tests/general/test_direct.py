@@ -48,6 +48,8 @@ def test_general_kernels_have_the_gradients_of_those_of_springs(units, integrato
     springs, general = (Evaluator(case, beyond=beyond) for beyond in ("", "a comparison"))
     own, found = (each.evaluate(case.initial, sensitivity="direct") for each in (springs, general))
     assert springs.beyond == ""
+    peak = general.with_objectives(["G"]).evaluate(case.initial, sensitivity="direct")
+    assert peak.work["design_states"] > peak.work["steps"]  # those of every step, not of the peak alone
     adjoint = general.evaluate(case.initial)
     for name, gradient in own.gradients.items():
         size = np.abs(gradient).max()
@@ -65,5 +67,5 @@ def test_rows_that_are_carried_together_have_the_gradients_of_each_alone(integra
     assert len(together.gradients) > 3
     whole = Evaluator(case)
     for name, gradient in together.gradients.items():
-        alone = whole.looking_at([name]).evaluate(alpha, sensitivity="direct")
+        alone = whole.with_objectives([name]).evaluate(alpha, sensitivity="direct")
         assert np.abs(alone.gradients[name] - gradient).max() <= 1e-11 * np.abs(gradient).max(), name
