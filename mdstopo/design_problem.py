@@ -114,7 +114,7 @@ class DesignProblem:
         """The pricing states of a weighted sum of the rows of U and of constraints on responses, with factors (R +
         C,), at the last evaluation.
 
-        Where nothing is shared and no parameter varies.
+        Where no parameter of a law varies, nor a point or a defined name.
         """
         of_limits = {f"constraints[{i}]": evaluation.constraint_peaks[i] for i, _ in self._responses}
         all_peaks = {**evaluation.peaks, **of_limits}

@@ -1,8 +1,8 @@
 """Which tests `make test` leaves out, for their time: they have the mark `thorough`; `make test-all` runs them, too.
 
 Every promise keeps a test among the others. What is listed here repeats one with another integrator, method, law or
-scene; is a whole application; or compiles kernels that few cases need. Of a property that holds for any example
-`make test` tries fewer of them (`examples`).
+scene; is a whole application; or compiles kernels that few cases need. Of random examples of a property
+`make test` tries fewer (`examples`).
 """
 
 import pytest

@@ -6,7 +6,7 @@ from benchmarks.peers.race import Entry
 from benchmarks.peers.table import OURS
 
 #: fixed steps of the closed loops, whose peers but CasADi have nothing else: parts of their 0.3 s
-STEPS = tuple(0.3 / count for count in (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 18))
+STEPS = tuple(0.3 / count for count in (*range(3, 17), 18))
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 
 

@@ -158,15 +158,10 @@ def with_start_set(case: Case) -> Case:
     """The case with a coarse subset of the candidates of its priced groups, enough of them for its volume rows."""
     count = START_SET
     while True:
-        begun = with_members(
-            case,
-            {
-                each.name: own
-                for groups in mirrored_groups(case)
-                for own in [_coarse(groups[0], count)]
-                for each in groups
-            },
-        )
+        pairs: dict[str, Pairs] = {}
+        for groups in mirrored_groups(case):
+            pairs |= dict.fromkeys((each.name for each in groups), _coarse(groups[0], count))
+        begun = with_members(case, pairs)
         lacking = [row for row in begun.constraints if isinstance(row, VolumeRow) and not _suffices(begun, row)]
         if not lacking or count >= min(MOST_STARTED, max(_count(group) for group in case.priced_groups)):
             return begun

@@ -47,7 +47,7 @@ class DesignSpace:
 
     @property
     def slots(self) -> IndexArray:
-        """(N,): which x each alpha is."""
+        """(N,) which x each alpha is."""
         return self._slots
 
     def expand(self, x: FloatArray) -> FloatArray:
@@ -117,8 +117,10 @@ def _values(pieces: list[tuple[float, int]]) -> FloatArray:
 
 
 def slots_of(counts: Mapping[str, int], shared: Sequence[str], mirrored: Sequence[Sequence[str]]) -> IndexArray | None:
-    """(N,) the number of the optimiser's variable that each alpha is; None where each alpha is a variable of its
-    own."""
+    """(N,) the number of the optimiser's variable that each alpha is; None where each alpha is a variable of its own.
+
+    counts: how many members each design group has, in order.
+    """
     if not shared and not mirrored:
         return None
     first: dict[str, str] = {}

@@ -148,7 +148,10 @@ def build_constraints(
     frames: Frames,
     reading: Reading,
 ) -> tuple[VolumeRow | ResponseRow, ...]:
-    """The constraints of the case, without those that cannot be made, checked against the bounds."""
+    """The constraints of the case, without those that cannot be made, checked against the bounds.
+
+    groups: None where members could not be read.
+    """
     built: list[VolumeRow | ResponseRow] = []
     volumes: list[tuple[str, VolumeRow]] = []
     for fields in top["constraints"] if isinstance(top["constraints"], list) else ():

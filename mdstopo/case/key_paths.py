@@ -77,7 +77,7 @@ def stands(steps: Sequence[str], root: Node) -> bool:
 
 
 def varied_by(steps: list[str], root: Node) -> str:
-    """The name of the design variable that a key path's number of a law is; empty where it is none."""
+    """That the number of a law at a key path is a design variable, and which one, in words; empty where it is none."""
     for name, node in _variables(root):
         stated = {key: value for key, (_, value) in node.entries.items()}
         if "group" not in stated or "parameter" not in stated or stated["parameter"].text != steps[-1]:
@@ -90,7 +90,7 @@ def varied_by(steps: list[str], root: Node) -> str:
 
 
 def varied_as(word: str, root: Node) -> str:
-    """The name of the design variable that a defined name is; empty where it is none."""
+    """That a defined name is a design variable, and which one, in words; empty where it is none."""
     for name, node in _variables(root):
         stated = node.entries.get("of")
         if stated is not None and stated[1].text == f"define.{word}":

@@ -260,7 +260,7 @@ class NumberOrWord(Value):
 
 @frozen
 class Version(Value):
-    """The kind of the number of the format, of which only some can be read."""
+    """The kind of the number of the format, of which one can be read."""
 
     number: int
 

@@ -13,7 +13,7 @@ class LossKind(NamedTuple):
 
     name: as case files have it; doc: a sentence for the case reference. function: module:function, as of
     `fit.loss_functions.linear`. is_robust: whether large residuals count less than their squares, so that intervals and
-    deviations have to be estimated otherwise.
+    deviations have to be estimated otherwise; False of least squares alone, for which SciPy has a way of its own.
     """
 
     name: str

@@ -254,7 +254,7 @@ class Signals(Value):
 
     @property
     def table(self) -> Record:
-        """The kind of a mapping with the key `table`, whose value are rows of a time and the quantities."""
+        """The kind of a mapping with the key `table`: rows of a time and the values of all quantities."""
         rows = Key("table", self.rows, f"rows {self.rows.row_text}, linear between them", True)
         return Record("a table of time", (rows,), doc="A quantity over time.")
 

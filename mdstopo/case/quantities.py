@@ -132,7 +132,7 @@ def _named(name: str) -> Unit:
 
 
 def unit_at(stated: str, path: str) -> str:
-    """The unit of the number at a key path, where its key states several units for several numbers.
+    """The unit of the number at a key path, where its key states several units for several numbers. stated: these.
 
     `N/m, N/m, N m/rad` and `m and N` go by the place in a list, `m or rad` by whether an angle is meant.
     """

@@ -122,8 +122,9 @@ class Document:
         return self._written
 
     def case(self, without: tuple[str, ...] = (), at: Mapping[str, float] | None = None) -> Case:
-        """The case of the document, perhaps at other numbers.
+        """The case of the document.
 
+        without: sections that are not read. at: numbers, by their key path, in the place of those that are stated.
         Raises CaseError as `load_case`.
         """
         reading = self._reading.again()

@@ -156,7 +156,7 @@ class ByName(Value):
 @frozen
 class ByShape(Value):
     """The kind of a value that is read as one kind where it is a scalar, and as others where it is a list or a
-    mapping."""
+    mapping. what: all of them in words."""
 
     what: str
     scalar: Kind | None = None
@@ -179,7 +179,8 @@ class ByShape(Value):
 
 @frozen
 class ByDepth(Value):
-    """The kind of a list, which is read as one kind if it holds single values, and as another if it holds lists."""
+    """The kind of a list, which is read as one kind if it holds single values, and as another if it holds lists. what:
+    both in words."""
 
     what: str
     flat: Kind

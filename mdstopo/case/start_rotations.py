@@ -73,7 +73,8 @@ def frame_along(axis: FloatArray) -> FloatArray:
 
 
 def frame_with(axis: FloatArray, towards: FloatArray) -> FloatArray:
-    """As `frame_along`, with the second vector in the plane of the axis and another vector that is not along it."""
+    """Right-handed unit vectors (3, 3) by rows, the first along a unit vector, the second in its plane with another
+    vector that is not along it."""
     second = towards - float(towards @ axis) * axis
     second = unit(second.tolist())
     second = unit((second - float(second @ axis) * axis).tolist())  # once more: what cancelled is gone

@@ -33,8 +33,8 @@ class Scenario(Value):
 
 @frozen
 class Measure(Value):
-    """What the values at all points of a sample become: a record of `case.measures`, with `factor` and `level` where
-    these are part of it."""
+    """What the values at all points of a sample become: the name of a record of `case.measures`, with `factor` and
+    `level` where these are part of it."""
 
     name: str
     factor: float = 0.0

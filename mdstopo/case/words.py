@@ -40,7 +40,7 @@ def count_text(count: int) -> str:
 
 
 def number_text(value: float) -> str:
-    """A number in as few digits as tell it exactly."""
+    """A number as text of at most ten digits."""
     return f"{value:.10g}"
 
 

@@ -29,7 +29,7 @@ def lines_of(conclusion: "Conclusion | None", name: str) -> list[list[str]]:
 
 
 def document_of(conclusion: "Conclusion | None") -> dict[str, Any] | None:
-    """The results on a fresh sample as values for JSON, by name."""
+    """The results of an uncertain case as values for JSON, by objective and constraint."""
     if conclusion is None:
         return None
     return {

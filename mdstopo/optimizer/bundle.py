@@ -16,7 +16,7 @@ from mdstopo.optimizer.problem import Bools, Floats, Ints, Sample, largest_of_gr
 from mdstopo.optimizer.stack import Slopes, Stack, alike, joined, slopes_of, steepest_of
 from mdstopo.optimizer.wide_numbers import WIDE
 
-#: numbers that the rows may take, and the room for rows at least and at most, in rows; of very many variables the least
+#: numbers that the rows may take; the least and the most rows that may be kept, of very many variables the least
 ROOM, LEAST, MOST = 2e7, 8, 160
 #: a row within this of another of its group, in slope and in value relative to the steepest, is the same
 SAME = 1e-9
@@ -201,7 +201,8 @@ class Bundle:
     def with_rejected(self, seen: "Bundle", below: Floats) -> "Bundle":
         """These rows with those of a rejected trial, seen from the iterate, as the newest ones that are not its own.
 
-        At most a quarter of the rows that may be kept are one trial's: those nearest to carrying a multiplier there.
+        At most a quarter of the rows that may be kept, or `LEAST`, are one trial's: those nearest to carrying a
+        multiplier there.
         below (K,): how far each is from that, as `Bundle.below` tells it.
         """
         most = max(self._most() // 4, LEAST)

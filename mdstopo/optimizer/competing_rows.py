@@ -25,9 +25,9 @@ from mdstopo.optimizer.nearest_feasible import repair
 from mdstopo.optimizer.problem import Floats, LinearRows, largest_of_groups
 from mdstopo.optimizer.stack import Slopes, Stack, joined
 
-#: what violations cost, in multipliers: what is beyond one of them is the merit's alone, and makes steps along a curved
-#: limit short; the least share of the violation that could go which has to go; the factor on penalties until it does,
-#: and how often
+#: what violations cost, in multipliers of their limits: more than one, or the merit would be least where limits are
+#: violated, but little more, or it would reject long steps along a curved limit; the least share of the violation that
+#: could go which has to go; the factor on penalties until it does, and how often
 MARGIN, STEER, RAISE, RAISES = 1.2, 0.3, 5.0, 8
 #: steps that curvature is learnt from, where B is a matrix and where it is not
 STEPS, FEW_STEPS = 60, 12

@@ -326,7 +326,7 @@ def eliminate(matrix: Floats, right: Floats, solution: Floats) -> bool:
 
 @kernel
 def centred_gap(gap: float, share: float) -> float:
-    """The gap that a corrector aims for: gap times share cubed, share of it that the predictor leaves (Mehrotra).
+    """The gap that a corrector aims for (Mehrotra): gap times the cube of the share of it that the predictor leaves.
 
     In a `member_kernel` LLVM may order the factors, which it does otherwise in some processes: last bits would differ.
     """

@@ -78,7 +78,10 @@ def short(x: Floats) -> Floats:
 
 
 class Kept(Generic[T]):
-    """A function of arrays that keeps its last two results; arrays are never changed in place."""
+    """A function of arrays that keeps its last two results.
+
+    Arrays are known by their identity, so that none may be changed in place.
+    """
 
     def __init__(self, function: Callable[..., T]) -> None:
         self._function = function

@@ -73,7 +73,7 @@ class Pricing:
 
 
 def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None = None) -> Prices | None:
-    """The prices of candidates of a case at a design (N,) of its members; None where it cannot be evaluated.
+    """The prices of candidates of a case at a design, the optimiser's x (n,); None where it cannot be evaluated.
 
     engine, of: the case's evaluator, and what the optimiser sees of it.
     count: of about so many candidates of each group, evenly spread; None: of all.
@@ -107,7 +107,7 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
 
 
 def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
-    """The prices at a design (N,), with the largest gain as it is once the best candidates are built.
+    """The prices at a design, x (n,), with the largest gain as it is once the best candidates are built.
 
     Members of laws that switch have steps end at their switches where they are built; prices know no such steps, and so
     differ a little. CONFIRMED of each group are built. Of all others the best one counts with its price and the largest
@@ -121,9 +121,9 @@ def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:
         here = group.from_index * width + group.to_index
         more[group.name] = np.divmod(np.union1d(here, chosen[group.name][0] * width + chosen[group.name][1]), width)
     larger = with_members(case, more)
-    alpha = in_case(larger, packed(case, x))
+    same = in_case(larger, packed(case, x))
     other = cast("DesignProblem", make_engine(larger).problem(problem.scalarisation))
-    sample = other.evaluate(alpha)
+    sample = other.evaluate(same)
     if sample.status is not Status.OK:
         return prices
     slopes = slopes_with(prices, gradients_of(sample), _places(case, larger)) + prices.linear @ other.linear.A

@@ -52,8 +52,10 @@ class Robust:
 
 @dataclass(frozen=True)
 class Conclusion:
-    """The results of the final design on samples, by objective, then by bounded response; and how many points could be
-    computed."""
+    """The results of the final design on samples, by objective, then by bounded response.
+
+    points: of the fresh sample; lost: those of it that could not be computed.
+    """
 
     results: tuple[Robust, ...]
     points: int

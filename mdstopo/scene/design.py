@@ -38,7 +38,8 @@ class Design:
         self._weigh: Callable[[], Any] | None = None
 
     def take(self, alpha: FloatArray) -> FloatArray:
-        """Make the numbers of a design the present ones; ValueError where it is none (`checked`)."""
+        """`values`, after the numbers of a design have become the present ones; ValueError where it is none
+        (`checked`)."""
         values = self.values
         given = np.asarray(alpha)
         values[:] = given if given.shape == values.shape else checked(self._case, given)

@@ -83,8 +83,8 @@ def all_found(states: Sequence[State | None]) -> bool:
 
 
 def came_to(states: Sequence[State | None]) -> tuple[int, int]:
-    """How many starts had come to an optimum, or near one, at the first quota, and to how many distinct optima; the
-    same at any later time."""
+    """How many starts had come to an optimum at the first quota, or were still on their way to one, and to how many
+    distinct ones; the same at any later time."""
 
     def is_known(index: int) -> bool:
         state = states[index]

@@ -145,7 +145,10 @@ def run_start(
 
 def soften(settings: Settings, problem: Problem, first: Floats | None, stop: Stop) -> State | None:
     """The end of a short run with a quarter of the members' strength, after which a start goes on; None where it was
-    stopped."""
+    stopped.
+
+    The run ends, too, where members so weak cannot keep the limits.
+    """
     optimizer = make(problem.softened(SOFT_STRENGTH), settings)  # type: ignore[attr-defined]
     state = optimizer.start(first)
     while state.running and not state.is_restoring and state.iteration < SOFT_ITERATIONS:
