@@ -1,7 +1,7 @@
 """Where kernels are not known to be cached, other processes compile them first: `compile_apart`.
 
 Why it is not this one, `starts.getting_ready` tells. Another process is this module run as a program: alone it compiles
-all that the case needs; with the word `back` what the optimiser needs and what looks back at steps that were made. For
+all that the case needs; with the word `back` the optimiser and what evaluates responses and gradients from steps. For
 scenes with joints and other laws both run side by side, and what the one has compiled the other finds on the disk.
 Where nothing is optimised, one process beside this one has a share of its own, `responses` or `steps`:
 `compiling_in_background`.
@@ -27,10 +27,10 @@ from mdstopo.plan.pricing import price
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.starts.evaluator_interface import even, problem_of
-from mdstopo.starts.getting_ready import FEW, get_ready, meet, motions
+from mdstopo.starts.getting_ready import FEW, get_ready, load_optimizer, motions
 from mdstopo.warm import compilation_due, compiling, tiny
 
-#: the words that have a process compile what looks back, with the optimiser and without it, and what makes steps
+#: the words that have a process compile what evaluates steps, with the optimiser and without it, and what makes steps
 BACK, RESPONSES, STEPS = "back", "responses", "steps"
 #: candidates that are priced to have the kernels compiled
 FEW_CANDIDATES = 1000
@@ -73,7 +73,7 @@ def _compile_in_children(message: bytes, each: list[list[str]]) -> None:
 @contextlib.contextmanager
 def compiling_in_background(case: Case, share: str) -> Iterator[None]:
     """Meanwhile another process compiles a share of what a scene with joints or other laws needs, where nothing of it
-    is there yet: with RESPONSES what looks back at steps, with STEPS what makes steps, where `auto` has to.
+    is there yet: with RESPONSES what evaluates steps, with STEPS what makes them, where `auto` has to.
 
     What this process does meanwhile finds on the disk what the other one has compiled.
     """
@@ -117,7 +117,7 @@ def _end(child: subprocess.Popen[bytes]) -> None:
 
 def compile_in_background() -> None:
     """Compile what few variables need: the share of the background process (`warm`) where there are many."""
-    meet(tiny("auto"), FEW)
+    load_optimizer(tiny("auto"), FEW)
 
 
 def _marker(case: Case) -> Path:
@@ -148,15 +148,15 @@ def _main() -> None:
 
 
 def _compile_back(case: Case) -> None:
-    """Compile the optimiser, and what looks back at steps.
+    """Compile the optimiser, and what evaluates responses and gradients from steps.
 
-    In this order: meanwhile the other process gets on with forces and joints, which what looks back calls as well and
-    then finds on the disk.
+    In this order: meanwhile the other process gets on with forces and joints, which the latter calls as well and then
+    finds on the disk.
     """
     engine = evaluator_of(case, in_background=False)
-    meet(case, FEW)
+    load_optimizer(case, FEW)
     if getattr(problem_of(engine, even(case)), "competes", False):
-        meet(case, FEW, competes=True)
+        load_optimizer(case, FEW, competes=True)
     engine.compile_responses()
 
 
@@ -165,7 +165,7 @@ def _compile_all(case: Case) -> None:
     many = case.space.size >= MANY
     engine = evaluator_of(case, share=["mdstopo.session.compiling_apart"] if many else [])
     if many:
-        meet(case, MANY)
+        load_optimizer(case, MANY)
     if beyond_springs(case):
         engine.compile_steps()
         motions(case, engine, case.start)  # what the other process compiles last comes last here

@@ -33,9 +33,9 @@ def get_ready(
     """
     competes = bool(getattr(problem, "competes", False))
     for size in [FEW, *(many for many in (MANY, WIDE) if len(problem.initial) >= many)]:
-        meet(case, size, size >= WIDE and competes)
+        load_optimizer(case, size, size >= WIDE and competes)
     if competes:
-        meet(case, FEW, competes)
+        load_optimizer(case, FEW, competes)
     stated, begin = first_design(case, problem, initial)
     before = motions(case, engine, case.space.expand(begin))
     if case.n_members <= _SMALL:
@@ -43,7 +43,7 @@ def get_ready(
     return stated, begin, before
 
 
-def meet(case: Case, size: int, competes: bool = False) -> None:
+def load_optimizer(case: Case, size: int, competes: bool = False) -> None:
     """Load the kernels of the optimiser for so many variables, and for rows that compete where they do."""
     optimizer = make_optimizer(case, _Toy(size, competes))
     state = optimizer.start()
@@ -57,7 +57,7 @@ def motions(case: Case, engine: Engine, design: Floats) -> dict[str, Motion]:
 
 
 class _Toy:
-    """A problem of two rows, both of which decide, or of many variables the higher: enough to meet every kernel."""
+    """A problem of two rows, both of which decide, or of many variables the higher: enough to call every kernel."""
 
     def __init__(self, size: int, competes: bool) -> None:
         self.competes = competes

@@ -11,10 +11,10 @@ from mdstopo.engine import Evaluator
 
 def test_it_ends_with_an_evaluator_that_is_never_used(monkeypatch):
     monkeypatch.setattr(warm, "is_compiled", lambda _integrator: False)
-    beside = warm.BackgroundCompiler("gauss")
-    child = beside._child
+    compiler = warm.BackgroundCompiler("gauss")
+    child = compiler._child
     assert child.poll() is None
-    del beside
+    del compiler
     gc.collect()
     assert child.returncode is not None
 
