@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 
 #: the highest power of time that virtual changes within a step have, and stages from which on they have it
 HIGHEST, MANY = 3, 8
-#: the largest error of a price in a pass where laws switch, relative to the largest price: prices of these are
-#: accurate to the steps alone
-SWITCHING_ERROR = 1e-8
 
 
 class ScenePricingStates(NamedTuple):
@@ -178,9 +175,10 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         return list(found.values())
 
     def error(self, states: PricingStates) -> float:
-        """The largest error of a price in a pass, relative to the largest price."""
-        switches = any(scene.steps is not None for scene in states.scenes)
-        return SWITCHING_ERROR if switches else SMOOTH_ERROR
+        """See `CandidatePass.error`; 0 where a law has modes, or a formula that may be as sharp as these: a few
+        candidates in the middle of a tile can then go through a mode that none of those beside them do."""
+        laws = (law for scene in states.scenes for place in self._places for law in scene.case.members[place].laws)
+        return 0.0 if any(kernels_of(type(law)).modes is not None for law in laws) else SMOOTH_ERROR
 
     def _packed_scene(self, states: PricingStates) -> tuple[IndexArray, FloatArray]:
         """A packed scene with room for the members of a tile, and for the numbers of any of the scenes' laws."""

@@ -96,7 +96,7 @@ class CandidatePass(ABC, Generic[A]):
         """The derivatives (K,) by alpha of members from first points to second ones."""
 
     def error(self, states: A) -> float:
-        """The largest error of a price in a pass, relative to the largest price."""
+        """The largest error of a price in a pass, relative to the largest price; 0: every price is computed."""
         return SMOOTH_ERROR
 
     def prices(self, states: A, i: IndexArray, j: IndexArray) -> FloatArray:
@@ -140,11 +140,12 @@ class CandidatePass(ABC, Generic[A]):
         """(COMMON,) of what candidates have in common, without what belongs to a law; worth: of a unit of cost."""
         own = self.candidates
         common = np.zeros(COMMON)
+        error = self.error(states)
         places = spread(len(self.homes[0]), len(self.homes[1]), SAMPLE)
         a, b = (each.ravel() for each in np.meshgrid(*places, indexing="ij"))
         _, there = self._lengths(a, b)
         sample = self.prices_between(states, a[there], b[there])
-        common[ERROR] = max(self.error(states) * np.abs(sample).max(initial=0.0), np.finfo(float).tiny)
+        common[ERROR] = max(error * np.abs(sample).max(initial=0.0), np.finfo(float).tiny) if error else 0.0
         common[COST] = -1.0 if own.cost is None else own.cost
         common[BELOW] = np.nextafter(own.shortest, -np.inf) if own.shortest else 0.0
         common[ABOVE] = np.nextafter(own.longest, np.inf)
