@@ -46,6 +46,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     load_slopes,
     pose_size,
     rotations,
+    turned_pose,
     window_accelerations,
     window_jvp,
     window_rates_with_maps,
@@ -113,7 +114,7 @@ def make_nodes(model):
         np.zeros((MOST, n)), np.zeros((MOST, n_pair, pose_size(model))),
         np.zeros((MOST, model.home.shape[0], window_size(model))), np.zeros((size, width)), np.zeros((size, width)),
         np.zeros((5, n)), np.zeros(model.size[0]), inverse, np.zeros(n_pair), np.empty(MOST),
-        np.empty((MOST, n_pair, sums_size(model))),
+        np.zeros((MOST, n_pair, sums_size(model))),  # those of pairs without members stay so
     )  # fmt: skip
 
 
@@ -150,6 +151,9 @@ def balance_nodes(model, member_state, segment, s, energies, q0, rel0, workspace
     for i in range(s):
         window_state(model, q0, nodes.x[i], nodes.y[i], nodes.q[i], nodes.v[i])
         place_pairs(model, nodes.q[i], nodes.v[i], np.bool_(True), workspace, nodes.rel[i], nodes.sums[i])
+        for p in range(model.pair.shape[0]):
+            if workspace.carries[p] == 0:  # bodies that are tied to nothing move, too
+                turned_pose(model, p, workspace.turned, nodes.q[i], nodes.v[i], nodes.rel[i])
     sums_at_poses(model, segment, nodes.when, member_state, nodes.rel, s, energies, nodes.sums)
     work[FORCES] += s
     work[TANGENTS] += s

@@ -213,3 +213,30 @@ def test_auto_takes_explicit_or_implicit_steps_where_dampers_hold_windows_short(
     assert "windows of collocation short" in chosen[500.0].integrator_reason
     assert chosen[1e6].integrator == "esdirk"
     assert chosen[1.0].evaluate(np.array(chosen[1.0].case.initial)).work["steps_held_short"] < 50
+
+
+def test_bodies_that_are_tied_to_nothing_leave_every_evaluation_the_same_to_the_bit() -> None:
+    """Pairs without members have sums, too: what memory held before does not stand in them."""
+    loose = {"mass": 4, "inertia": 0.6, "position": [2, 1], "velocity": [0.5, 0.9], "angular_velocity": 0.7}
+    content = {
+        **PAIR,
+        "bodies": {**PAIR["bodies"], "loose": loose},
+        "loads": [{"body": "b", "force": {"table": [[0, 0, 0], [0.1, 6, 4], [0.1, -5, 3], [0.6, 0, 0]]}}],
+        "objectives": {
+            **PAIR["objectives"],
+            "away": {"response": {"displacement": {"body": "loose", "component": "y"}}, "over_time": "final"},
+        },
+        "combine": {"method": "weighted_sum", "weights": {"speed": 1, "turn": 1, "away": 1}},
+    }
+    random = np.random.default_rng(7)
+    found = set()
+    for k in range(24):
+        # arrays of many lengths come and go, so that the next ones are handed what these held
+        junk = [np.full(int(random.integers(1, 4000)), (1e3, 1e-3, 7.0, -1.0)[k % 4]) for _ in range(200)]
+        del junk
+        result = mdstopo.evaluate(case_of(content, tolerance=1e-9))
+        found.add((tuple(result.objectives.values()), tuple(np.concatenate(list(result.gradients.values())))))
+    assert len(found) == 1
+    other = mdstopo.evaluate(case_of(content, integrator="runge_kutta", tolerance=1e-10))
+    for name, value in other.objectives.items():
+        assert result.objectives[name] == pytest.approx(value, rel=1e-8)
