@@ -24,6 +24,7 @@ from mdstopo.general.parameters import add_times
 from mdstopo.general.permanent_sets import add_sets_of_rows, count_sets, keep_start
 from mdstopo.general.row_design import add_designs_of_rows
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, restore_modes
+from mdstopo.general.step_linear import free_places
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 
@@ -51,15 +52,10 @@ def make_units(model, rows, columns):
     columns: M_padded + P.
     """
     n = model.mass.shape[0]
-    place = np.empty(n, np.int64)
-    free = 0
-    for d in range(n):
-        if model.free[d] != 0:
-            place[free] = d
-            free += 1
-    many = 2 * free if rows > 2 * free else 0
+    place = free_places(model)
+    many = 2 * place.shape[0] if rows > 2 * place.shape[0] else 0
     return Units(
-        place[:free], np.empty((many, n)), np.empty((many, n)), np.zeros((many, 2, n)),
+        place, np.empty((many, n)), np.empty((many, n)), np.zeros((many, 2, n)),
         np.empty((many, count_sets(model))), np.empty((many, 17, n)), np.empty((many, columns)), np.ones(many),
     )  # fmt: skip
 

@@ -326,6 +326,18 @@ def keep_free(model, x):
 
 
 @kernel
+def free_places(model):
+    """(F,): which of the freedoms are unknowns."""
+    place = np.empty(model.free.shape[0], np.int64)
+    count = 0
+    for d in range(place.shape[0]):
+        if model.free[d] != 0:
+            place[count] = d
+            count += 1
+    return place[:count]
+
+
+@kernel
 def prepare_stage_forward(model, history, o, w_q, w_v, sweeps, workspace):
     """Prepare a stage for `stage_forward`: once for any number of changes. Returns its K and C.
 

@@ -15,7 +15,7 @@ from mdstopo.general.method_interface import step_forward
 from mdstopo.general.row_design import add_designs_of_rows, add_members_of_rows
 from mdstopo.general.row_sweep import add_share
 from mdstopo.general.step_history import FIRST, SEGMENT
-from mdstopo.general.step_linear import keep_free
+from mdstopo.general.step_linear import free_places, keep_free
 from mdstopo.general.switches import carriers
 from mdstopo.mechanics.kinematics.kinematics_interface import add_pair_force, freedoms, pose_size
 from mdstopo.scene.springs_model import FloatArray, IndexArray
@@ -71,14 +71,11 @@ def make_step_map(model, vectors, by_poses):
     """
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
-    place = np.empty(n, np.int64)
+    place = free_places(model)
+    free = place.shape[0]
     row_of = np.full(n, -1)
-    free = 0
-    for d in range(n):
-        if model.free[d] != 0:
-            place[free] = d
-            row_of[d] = free
-            free += 1
+    for k in range(free):
+        row_of[place[k]] = k
     width = (2 + vectors) * free
     pairs = np.empty(n_pair, np.int64)
     acting = 0
@@ -97,7 +94,7 @@ def make_step_map(model, vectors, by_poses):
     return StepMap(
         np.zeros((width, width + 1)), np.zeros((of_force, STAGES, n)),
         np.zeros((of_pose, STAGES, n_pair, freedoms(model))), np.zeros((STAGES, n_pair, pose_size(model))),
-        carriers(model), pairs[:acting], place[:free], row_of, np.empty(TOGETHER, np.int64),
+        carriers(model), pairs[:acting], place, row_of, np.empty(TOGETHER, np.int64),
         np.empty((TOGETHER, n)), np.empty((TOGETHER, n)),
         np.empty((TOGETHER, 2, n)), np.empty((TOGETHER, STAGES, n)), np.empty((TOGETHER, STAGES, 3, n)),
         np.empty((TOGETHER, STAGES, model.size[0])), np.zeros(freedoms(model)), np.zeros(width + 1),
