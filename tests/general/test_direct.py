@@ -10,29 +10,14 @@ from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 
 from .support import design_of, load
+from .test_against_springs import CASE as TWO_BODIES
 
-CASE = """
-format: 1
-gravity: [0, -9.8]
-time: {end: 0.3}
-bodies:
-  torso: {mass: 60, inertia: 10, position: [0, 0], velocity: [0.1, 0], angular_velocity: 0.2}
-  vehicle: {mass: 2000, inertia: 6000, position: [0, -1], angle: 0.1}
-points:
-  a: {body: torso, grid: {rectangle: {center: [0, 0], size: [0.5, 0.5], count: 5}}}
-  b: {body: vehicle, grid: {line: {from: [-1, -0.8], to: [1, -0.8], count: 4}}}
-members:
-  belts: {from: a, to: b, law: {type: spring, stiffness: 900, damping: 30, preload: 5}}
-  ties: {from: {body: ground, at: [0, 1]}, to: a, law: {type: spring, stiffness: 300}, design: TIES}
-loads:
-  - {body: vehicle, acceleration: {table: [[0, 9.8, 0], [0.1, 4, 2], [0.3, 0, 0]]}, angular_acceleration: 20}
-  - {body: torso, force: [30, 10], at: [0.1, 0.2], frame: body}
-design: {initial: 0.4, power: 1.5}
-objectives:
-  G: {response: energy, over_time: max}
-  M: {response: energy, over_time: mean}
-combine: {weights: {G: 1, M: 1}}
-"""
+#: the scene on which the two families of kernels check each other, with two objectives
+CASE = TWO_BODIES.replace("design: false", "design: TIES").replace(
+    "objectives: {G: {response: energy, over_time: max}}",
+    "objectives: {G: {response: energy, over_time: max}, M: {response: energy, over_time: mean}}\n"
+    "combine: {weights: {G: 1, M: 1}}",
+)
 #: what is pushed through a step: forces on the one pair with design members (3, fewer than 6 freedoms), or on bodies
 UNITS = {"of pairs": "false", "of bodies": "true"}
 
