@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mdstopo.compiler.fields import Field, Fields, views_of
-from mdstopo.compiler.jit import entry, kernel, part
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.compiler.threads import shared, taken
 from mdstopo.general.general_model import INERTER, MEMBER_EXCESS, MEMBER_FREE_LENGTH, unpack_general
 from mdstopo.general.members import MODE
@@ -42,19 +42,19 @@ from mdstopo.mechanics.laws.law_table import (
     law_start,
 )
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-from mdstopo.sensitivity.springs_candidate_prices import COMPUTED, ERROR, sum_tile
+from mdstopo.sensitivity.springs_candidate_prices import COMPUTED, ERROR, keep_tile
 from mdstopo.sensitivity.tile_interpolation import (
-    ASKED,
     BROAD,
     COLUMNS,
     PLACES,
+    PRICED,
     ROWS,
     TALL,
-    ask,
     begin_tile,
     fill_lengths,
     make_scratch,
-    take,
+    next_candidates,
+    take_prices,
 )
 
 #: columns of `PricedCandidates.run`
@@ -85,8 +85,6 @@ ARRAYS = (
     "pose", "change", "pose_a", "energy", "when", "level", "step", "step_time", "node_pose", "node_a", "node_change",
     "node_level", "node_energy",
 )  # fmt: skip
-#: by what the number of the modes so far is multiplied before the next one is added: odd, so that none is forgotten
-SPREAD = 6364136223846793005
 #: states of one pass over a tile, whose poses stay in the nearest cache
 AT_ONCE = 32
 
@@ -173,9 +171,8 @@ def price_places(ints, floats, candidate_ints, candidate_floats, places, out):
     """
     model = unpack_general(ints, floats.copy())
     price = np.empty(PLACES)
-    trace = np.empty(PLACES, np.int64)
     candidates = unpack_candidates(candidate_ints, candidate_floats)
-    _price(model, candidates, places, np.int64(places.shape[1]), np.int64(0), price, trace)
+    _price(model, candidates, places, np.int64(places.shape[1]), np.int64(0), price)
     out[:] = price[: out.shape[0]]
 
 
@@ -243,12 +240,8 @@ def _price_each(
         price[:] = np.inf
         computed = _price_tile(model, candidates, grids, i, j, common[ERROR], scratch, price)
         fill_lengths(candidates.first_place, candidates.second_place, i, j, length)
-        for at in range(built[tile], built[tile + 1]):
-            price[places[at]] = np.inf
-        sum_tile(price, length, common, out[k])
         out[k, COMPUTED] = computed
-        if prices.shape[0] > 0:
-            prices[k] = price
+        keep_tile(k, tile, price, length, common, built, places, out, prices)
         k = taken(counter)
 
 
@@ -259,7 +252,7 @@ def _price_tile(model, candidates, grids, i, j, error, scratch, price):
     In:
       model: with room for its members, which are overwritten.
       candidates: a `PricedCandidates`.
-      grids, error: as of `tile_interpolation.take`. i, j: the tile.
+      grids, error: as of `tile_interpolation.take_prices`. i, j: the tile.
     Out:
       price (PLACES,): of its candidates.
     Scratch:
@@ -267,22 +260,22 @@ def _price_tile(model, candidates, grids, i, j, error, scratch, price):
 
     Returns how many prices were computed.
     """
-    plan, level, rows, columns, index, asked, trace, buffer = scratch
-    begin_tile(error, plan, level)
-    while ask(grids, i, j, plan, level, rows, columns):
+    plan, _, rows, columns, index, found, _ = scratch
+    begin_tile(error, scratch)
+    while next_candidates(grids, i, j, scratch):
         wide = plan[COLUMNS]
         count = plan[ROWS] * wide
         for a in range(plan[ROWS]):
             for b in range(wide):
                 index[0, a * wide + b] = i * TALL + rows[a]
                 index[1, a * wide + b] = j * BROAD + columns[b]
-        _price(model, candidates, index, count, wide, asked, trace)
-        take(grids, i, j, error, plan, level, rows, columns, asked, trace, buffer, price)
-    return plan[ASKED]
+        _price(model, candidates, index, count, wide, found)
+        take_prices(grids, i, j, error, scratch, price)
+    return plan[PRICED]
 
 
 @kernel
-def _price(model, candidates, index, count, row, price, trace):
+def _price(model, candidates, index, count, row, price):
     """The prices of some members, PLACES at most.
 
     In:
@@ -294,14 +287,12 @@ def _price(model, candidates, index, count, row, price, trace):
     Out:
       model: its members are overwritten.
       price (PLACES,): derivatives by alpha.
-      trace (PLACES,): through which modes each has gone, as a number; 0 where no law switches.
     """
     axes = candidates.first.shape[1]
     member_state = np.zeros((3, PLACES))
     start = np.empty(count)
     stated = np.empty(count)
     price[:] = 0.0
-    trace[:] = 0
     before = np.int64(-1)
     for k in range(candidates.run.shape[0]):
         scene = candidates.run[k, SCENE]
@@ -319,7 +310,7 @@ def _price(model, candidates, index, count, row, price, trace):
             free = stated[i] if candidates.rest[k] < 0.0 else candidates.rest[k]
             model.member[MEMBER_FREE_LENGTH, i] = free
             model.member[MEMBER_EXCESS, i] = (start[i] - free) * (start[i] + free)
-        _price_run(model, candidates, k, count, row, member_state, price, trace)
+        _price_run(model, candidates, k, count, row, member_state, price)
 
 
 @kernel
@@ -334,7 +325,7 @@ def _lengths(first, second, index, out):
 
 
 @kernel
-def _price_run(model, candidates, k, count, row, member_state, price, trace):
+def _price_run(model, candidates, k, count, row, member_state, price):
     """Add what members do by one law in the states of a run.
 
     In:
@@ -344,7 +335,7 @@ def _price_run(model, candidates, k, count, row, member_state, price, trace):
       row: members behind each other that begin at one point, or 0.
       member_state (3, PLACES): zeros; no member of a law that does not switch has a mode.
     Out:
-      price (PLACES,), trace (PLACES,): added to.
+      price (PLACES,): added to.
     """
     pose = candidates.pose
     change = candidates.change
@@ -352,7 +343,7 @@ def _price_run(model, candidates, k, count, row, member_state, price, trace):
     p = candidates.law[k]
     code = run[CODE]
     if run[LAST_STEP] > run[FIRST_STEP]:
-        _price_switching(model, candidates, k, count, price, trace)
+        _price_switching(model, candidates, k, count, price)
         return
     elastic = code == SPRING and p[1] == 0.0 and p[2] == 0.0
     begin = run[FIRST_STATE]
@@ -375,7 +366,7 @@ def _price_run(model, candidates, k, count, row, member_state, price, trace):
 
 
 @kernel
-def _price_switching(model, candidates, k, count, price, trace):
+def _price_switching(model, candidates, k, count, price):
     """Add what members of a law that switches do in the steps of a run.
 
     In:
@@ -383,23 +374,16 @@ def _price_switching(model, candidates, k, count, price, trace):
       candidates, k: a `PricedCandidates`, and the number of the run.
       count: how many members there are.
     Out:
-      price (PLACES,), trace (PLACES,): added to.
+      price (PLACES,): added to.
     """
     node = np.empty((NODE_ROWS, NODES))
     pieces = np.empty((CHANGES + 1, PIECE))
     for i in range(count):
-        found, trace[i] = _price_followed(model, candidates, k, i, trace[i], node, pieces)
-        price[i] += found
-
-
-@part
-def with_mode(modes, mode):
-    """The number of a sequence of modes that goes on with one more; with -1 where another law or scene begins."""
-    return SPREAD * modes + (mode + 2)
+        price[i] += _price_followed(model, candidates, k, i, node, pieces)
 
 
 @kernel
-def _price_followed(model, candidates, k, i, modes, node, pieces):
+def _price_followed(model, candidates, k, i, node, pieces):
     """What member i of a law that switches does in the steps of a run.
 
     A step in which it stays in its mode is summed over its stages, as for a member that is built. In a step in which
@@ -409,12 +393,11 @@ def _price_followed(model, candidates, k, i, modes, node, pieces):
     In:
       model: with the members.
       candidates, k, i: a `PricedCandidates`, the number of the run, and the member.
-      modes: the number of those that it has gone through in the runs before.
     Scratch:
       node (NODE_ROWS, NODES): the member at the nodes of a step.
       pieces (CHANGES + 1, PIECE): pieces of a step in which it stays in a mode.
 
-    Returns its part of the derivative by alpha, and the number of the modes with those of this run.
+    Returns its part of the derivative by alpha.
     """
     run = candidates.run[k]
     p = candidates.law[k]
@@ -425,8 +408,6 @@ def _price_followed(model, candidates, k, i, modes, node, pieces):
     kept = 0.0
     begun = run[FROM_START] == 0  # a law that acts later begins in mode 0, unset
     total = 0.0
-    modes = with_mode(modes, -1)
-    told = -1
     pieces[0, PIECE_MODE] = 0.0
     pieces[0, PIECE_SET] = 0.0
     last = 0
@@ -462,11 +443,6 @@ def _price_followed(model, candidates, k, i, modes, node, pieces):
         if not _stays(code, p, model.curves, rest, candidates.step_time[s], node, mode, kept):
             _fill_nodes(model, candidates, i, step[FIRST_NODE], node)
             last = _follow(code, p, model.curves, rest, candidates.step_time[s], node, pieces)
-        for at in range(last + 1):
-            own_mode = int(pieces[at, PIECE_MODE])
-            if step[KIND] == WHOLE and own_mode != told:
-                modes = with_mode(modes, own_mode)
-                told = own_mode
         if last == 0:
             if law_is_idle(code, mode):
                 continue
@@ -480,7 +456,7 @@ def _price_followed(model, candidates, k, i, modes, node, pieces):
         if step[KIND] == WHOLE:
             mode = int(pieces[last, PIECE_MODE])
             kept = pieces[last, PIECE_SET]
-    return total, modes
+    return total
 
 
 @kernel

@@ -140,17 +140,23 @@ class CandidatePass(ABC, Generic[A]):
         """(COMMON,) of what candidates have in common, without what belongs to a law; worth: of a unit of cost."""
         own = self.candidates
         common = np.zeros(COMMON)
-        error = self.error(states)
-        places = spread(len(self.homes[0]), len(self.homes[1]), SAMPLE)
-        a, b = (each.ravel() for each in np.meshgrid(*places, indexing="ij"))
-        _, there = self._lengths(a, b)
-        sample = self.prices_between(states, a[there], b[there])
-        common[ERROR] = max(error * np.abs(sample).max(initial=0.0), np.finfo(float).tiny) if error else 0.0
+        common[ERROR] = self._allowed(states)
         common[COST] = -1.0 if own.cost is None else own.cost
         common[BELOW] = np.nextafter(own.shortest, -np.inf) if own.shortest else 0.0
         common[ABOVE] = np.nextafter(own.longest, np.inf)
         common[WORTH], common[UPPER] = worth, self.upper
         return common
+
+    def _allowed(self, states: A) -> float:
+        """The largest error of a price in a pass: `error` of the largest price of a sample; 0: none."""
+        error = self.error(states)
+        if error == 0.0:
+            return 0.0
+        places = spread(len(self.homes[0]), len(self.homes[1]), SAMPLE)
+        a, b = (each.ravel() for each in np.meshgrid(*places, indexing="ij"))
+        _, there = self._lengths(a, b)
+        sample = self.prices_between(states, a[there], b[there])
+        return float(max(error * np.abs(sample).max(initial=0.0), np.finfo(float).tiny))
 
     def grids(self, states: A) -> Sequence[tuple[FloatArray, FloatArray]]:
         """The points that are priced, (n_A, d) and (n_B, d), once for each way in which they lie: those of `homes`."""

@@ -39,17 +39,17 @@ from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
 from mdstopo.sensitivity.springs_adjoint import reverse_sweep
 from mdstopo.sensitivity.state_in_step import state_in_step
 from mdstopo.sensitivity.tile_interpolation import (
-    ASKED,
     BROAD,
     COLUMNS,
     PLACES,
+    PRICED,
     ROWS,
     TALL,
-    ask,
     begin_tile,
     fill_lengths,
     make_scratch,
-    take,
+    next_candidates,
+    take_prices,
 )
 
 #: what is kept of a tile: how many candidates it has, the largest gain of one, below zero where none gains, the sum of
@@ -314,12 +314,8 @@ def _price_each(counter, points, grids, common, kind, pose, change, weight, buil
         price[:] = np.inf
         computed = _price_tile(points, grids, i, j, common, kind, states, member, scratch, price)
         fill_lengths(points[2], points[3], i, j, home)
-        for at in range(built[tile], built[tile + 1]):
-            price[places[at]] = np.inf
-        sum_tile(price, home, common, out[k])
         out[k, COMPUTED] = computed
-        if prices.shape[0] > 0:
-            prices[k] = price
+        keep_tile(k, tile, price, home, common, built, places, out, prices)
         k = taken(counter)
 
 
@@ -339,26 +335,24 @@ def _price_tile(points, grids, i, j, common, kind, states, member, scratch, pric
 
     Returns how many prices were computed.
     """
-    plan, level, rows, columns, _, asked, trace, buffer = scratch
-    error = common[ERROR]
+    plan, _, rows, columns, _, found, _ = scratch
     near = np.empty(2)
-    trace[:] = 0
-    begin_tile(error, plan, level)
-    while ask(grids, i, j, plan, level, rows, columns):
+    begin_tile(common[ERROR], scratch)
+    while next_candidates(grids, i, j, scratch):
         wide = plan[COLUMNS]
         count = plan[ROWS] * wide
-        _fill_asked(points, i * TALL, j * BROAD, rows[: plan[ROWS]], columns[:wide], common[FREE], member, near)
-        asked[:count] = 0.0
+        _fill_members(points, i * TALL, j * BROAD, rows[: plan[ROWS]], columns[:wide], common[FREE], member, near)
+        found[:count] = 0.0
         design_of_members(
             np.int64(0), np.int64(0), count, block_of(kind, count, wide if kind == 0 else 0), near, member, states[0],
-            states[1], states[2], asked,
+            states[1], states[2], found,
         )  # fmt: skip
-        take(grids, i, j, error, plan, level, rows, columns, asked, trace, buffer, price)
-    return plan[ASKED]
+        take_prices(grids, i, j, common[ERROR], scratch, price)
+    return plan[PRICED]
 
 
 @kernel
-def _fill_asked(points, row, column, rows, columns, free, member, near):
+def _fill_members(points, row, column, rows, columns, free, member, near):
     """Write candidates of a tile as members, row by row.
 
     In:
@@ -410,6 +404,26 @@ def _fill_asked(points, row, column, rows, columns, free, member, near):
     reach = math.sqrt(largest(far))
     near[0] = distance * distance
     near[1] = min(distance / max(reach, 1e-300), 1.0) ** 2
+
+
+@kernel
+def keep_tile(k, tile, price, length, common, built, places, out, prices):
+    """Write what is kept of the tile in place k of those that are priced, and on demand its prices.
+
+    In:
+      k, tile: its place, and its number.
+      length (PLACES,), common: as of `sum_tile`.
+      built, places: as of `price_candidates`.
+    In place:
+      price (PLACES,): becomes infinite of candidates that do not count.
+    Out:
+      out (K, TILE_NUMBERS), prices (K, PLACES) or (0, PLACES): row k is overwritten, of out but for COMPUTED.
+    """
+    for at in range(built[tile], built[tile + 1]):
+        price[places[at]] = np.inf
+    sum_tile(price, length, common, out[k])
+    if prices.shape[0] > 0:
+        prices[k] = price
 
 
 @part

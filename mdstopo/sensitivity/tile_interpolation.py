@@ -8,7 +8,8 @@ below the error that is allowed, and the one before it not far above, in either 
 polynomial says. Where those by the columns are larger, the part is halved; where those by the rows are, every row is
 priced at the nodes of the columns. What remains is priced one by one.
 
-A kernel that prices members asks here which candidates to price next (`ask`), and gives their prices back (`take`).
+A kernel that prices members is told here which candidates to price next (`next_candidates`), and gives their prices
+back (`take_prices`).
 """
 
 import math
@@ -34,8 +35,8 @@ FALLS = 2.0 ** (COLUMN_NODES - 1)
 #: the last coefficient but one may be so many times what is allowed: the next ones fall at least as fast as that
 BEFORE_LAST = 64.0
 #: of a plan: the level; the first column of the part, how many columns it has; whether every row is priced; rows and
-#: columns that are asked for; how many prices were, so far
-LEVEL, BEGIN, SIZE, EVERY_ROW, ROWS, COLUMNS, ASKED = range(7)
+#: columns of the next candidates; how many prices have been computed
+LEVEL, BEGIN, SIZE, EVERY_ROW, ROWS, COLUMNS, PRICED = range(7)
 PLAN = 7
 #: the level of a part that has its prices
 DONE = -1
@@ -81,7 +82,7 @@ def smooth_parts(points: FloatArray, numbers: FloatArray, size: int, nodes: Inde
 def smoothness(
     grids: tuple[FloatArray, FloatArray], chosen: tuple[IndexArray, IndexArray]
 ) -> tuple[FloatArray, FloatArray, IndexArray, IndexArray]:
-    """What `ask` and `take` know of two grids.
+    """What `next_candidates` and `take_prices` know of two grids.
 
     grids: the points that are priced, (n_A, d) and (n_B, d). chosen: their numbers among all of the grid.
 
@@ -106,7 +107,7 @@ def extent(grids, i, j):
 
 @part
 def make_scratch():
-    """What pricing of a tile needs: plan, level, rows, columns, index (2, PLACES), asked, trace, buffer."""
+    """What pricing of a tile needs: plan, level, rows, columns, index (2, PLACES), found (PLACES,), buffer."""
     return (
         np.zeros(PLAN, np.int64),
         np.zeros(PARTS, np.int64),
@@ -114,38 +115,38 @@ def make_scratch():
         np.zeros(BROAD, np.int64),
         np.zeros((2, PLACES), np.int64),
         np.zeros(PLACES),
-        np.zeros(PLACES, np.int64),
         np.zeros((COLUMN_NODES + TALL, BROAD)),
     )
 
 
 @kernel
-def begin_tile(error, plan, level):
+def begin_tile(error, scratch):
     """Begin a tile.
 
-    error: that a price may have; 0: all are computed.
-    plan (PLAN,), level (PARTS,): set.
+    error: that a price may have; 0: all are computed. scratch: of `make_scratch`; plan and level are set.
     """
+    plan, level = scratch[:2]
     plan[:] = 0
     level[:] = 0 if error > 0.0 else LEVELS
 
 
 @kernel
-def ask(grids, i, j, plan, level, rows, columns):
+def next_candidates(grids, i, j, scratch):
     """The next candidates of a tile whose prices are wanted, each of some rows with each of some columns.
 
     In:
       grids: as of `smoothness`.
       i, j: the tile.
-    In place:
-      plan (PLAN,): where the tile is, and how many rows and columns are asked for.
-      level (PARTS,): of each of its smallest parts at which it is tried; LEVELS: not at all; DONE: it has its prices.
-    Out:
-      rows (TALL,), columns (BROAD,): the candidates, by their places in the tile; columns are whole vectors, of which
-        the last may be there several times.
+    In and out:
+      scratch: of `make_scratch`, of which are read and set
+        plan (PLAN,): where the tile is, and how many rows and columns there are.
+        level (PARTS,): of each of its smallest parts at which it is tried; LEVELS: not at all; DONE: it has its prices.
+        rows (TALL,), columns (BROAD,): the candidates, by their places in the tile; columns are whole vectors, of which
+          the last may be there several times.
 
     Returns whether there are any.
     """
+    plan, level, rows, columns, _, _, _ = scratch
     height, width = extent(grids, i, j)
     while plan[LEVEL] < LEVELS:
         size = BROAD >> plan[LEVEL]
@@ -206,41 +207,34 @@ def _put_off(level, smallest, size, to):
 
 
 @kernel
-def take(grids, i, j, error, plan, level, rows, columns, asked, trace, buffer, price):
-    """Take the prices that `ask` has asked for.
+def take_prices(grids, i, j, error, scratch, price):
+    """Take the prices of the candidates that `next_candidates` has told.
 
     In:
-      grids, i, j: as of `ask`.
+      grids, i, j: as of `next_candidates`.
       error: that a price may have.
-      rows (TALL,), columns (BROAD,): of `ask`.
-      asked (any,): the prices, row by row.
-      trace (any,): how each member has gone through the modes of its laws, as a number.
-    In place:
-      plan (PLAN,), level (PARTS,): as of `ask`.
-    Scratch:
-      buffer (COLUMN_NODES + TALL, BROAD).
+    In and out:
+      scratch: as of `next_candidates`; found (PLACES,) has the prices, row by row. buffer is overwritten.
     Out:
       price (PLACES,): of the tile, where it is known now.
     """
+    plan, level, rows, columns, _, found, buffer = scratch
     height, wide = plan[ROWS], plan[COLUMNS]
-    plan[ASKED] += height * wide
+    plan[PRICED] += height * wide
     if plan[LEVEL] > LEVELS:
         for a in range(height):
             for b in range(wide):
-                price[rows[a] * BROAD + columns[b]] = asked[a * wide + b]
+                price[rows[a] * BROAD + columns[b]] = found[a * wide + b]
         return
     smallest = plan[BEGIN] // SHORT
     size = plan[SIZE]
     node = np.empty(COLUMN_NODES)
     weight = np.empty(COLUMN_NODES)
     worst = 0.0
-    alike = True
     fill_weights(grids[1], j * BROAD + plan[BEGIN], size, COLUMN_NODE[plan[LEVEL]], node, weight)
     for a in range(height):
-        worst = _worse(worst, _tail(asked, a * wide, 1, node, weight))
-        for b in range(wide):
-            alike &= trace[a * wide + b] == trace[0]
-    if not alike or not worst <= error:
+        worst = _worse(worst, _tail(found, a * wide, 1, node, weight))
+    if not worst <= error:
         more = 1.0
         if worst > error:  # not where it is no number
             more = max(1.0, min(math.log(worst / error) / math.log(FALLS), 1.0 * LEVELS))
@@ -251,15 +245,15 @@ def take(grids, i, j, error, plan, level, rows, columns, asked, trace, buffer, p
         row_weight = np.empty(ROW_NODES)
         fill_weights(grids[0], i * TALL, np.int64(TALL), ROW_NODE, row_node, row_weight)
         for b in range(wide):
-            worst = _worse(worst, _tail(asked, b, wide, row_node, row_weight))
+            worst = _worse(worst, _tail(found, b, wide, row_node, row_weight))
         if not worst <= error:
             plan[EVERY_ROW] = 1
             return
-        _along_rows(grids[0], i, row_node, row_weight, asked, buffer[COLUMN_NODES:])
+        _along_rows(grids[0], i, row_node, row_weight, found, buffer[COLUMN_NODES:])
     else:
         for a in range(height):
             for b in range(COLUMN_NODES):
-                buffer[COLUMN_NODES + a, b] = asked[a * wide + b]
+                buffer[COLUMN_NODES + a, b] = found[a * wide + b]
     _along_columns(grids[1], j * BROAD + plan[BEGIN], size, node, weight, buffer)
     _spread(buffer, extent(grids, i, j)[0], plan[BEGIN], size, price)
     _put_off(level, smallest, size, DONE)
@@ -339,11 +333,11 @@ def _shares(numbers, place, low, high, node, weight, share):
 
 
 @kernel
-def _along_rows(numbers, i, node, weight, asked, out):
+def _along_rows(numbers, i, node, weight, found, out):
     """Values of all rows of a tile at the nodes of the columns.
 
     numbers (n,), i: of the points of the first grid, and the strip.
-    node, weight (ROW_NODES,): of `fill_weights`. asked (ROW_NODES * COLUMN_NODES or more,): values at the nodes.
+    node, weight (ROW_NODES,): of `fill_weights`. found (ROW_NODES * COLUMN_NODES or more,): values at the nodes.
     out (TALL, COLUMN_NODES or more): set.
     """
     share = np.empty(ROW_NODES)
@@ -353,7 +347,7 @@ def _along_rows(numbers, i, node, weight, asked, out):
         for b in range(COLUMN_NODES):
             value = 0.0
             for k in range(ROW_NODES):
-                value += share[k] * asked[k * COLUMN_NODES + b]
+                value += share[k] * found[k * COLUMN_NODES + b]
             out[a, b] = value
 
 

@@ -9,7 +9,6 @@ from mdstopo.case import candidates
 from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.general.candidate_prices import with_mode
 from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
 from tests.sensitivity.test_candidate_prices import assert_dense_pass_is_right
 
@@ -408,17 +407,6 @@ def test_a_dense_pass_knows_the_points_of_mirror_images():
     candidates = evaluator.candidates_of(case.members[0])
     sample = candidates.prices(states, *np.divmod(np.arange(case.members[0].candidates.count), 2 * TALL))
     assert_dense_pass_is_right(candidates, states, np.abs(sample).max(), 1e-12)
-
-
-@pytest.mark.parametrize(("first", "second"), [((0, 1), (1, 0)), ((0,), (1,)), ((), (0,))])
-def test_a_sequence_of_modes_has_a_number_of_its_own(first, second):
-    """However many changes follow: two members that rattle alike in the end need not have begun alike."""
-    known = [np.int64(0), np.int64(0)]
-    with np.errstate(over="ignore"):
-        for k, begin in enumerate((first, second)):
-            for mode in (-1, *begin, *(0, 1) * 40):
-                known[k] = with_mode.py_func(known[k], mode)
-    assert known[0] != known[1]
 
 
 def test_a_pass_over_a_part_of_the_candidates_prices_them_as_the_whole_pass_does():

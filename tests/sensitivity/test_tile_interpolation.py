@@ -5,25 +5,25 @@ import pytest
 
 from mdstopo.compiler.vector import WIDE
 from mdstopo.sensitivity.tile_interpolation import (
-    ASKED,
     BROAD,
     COLUMN_NODE,
     COLUMN_NODES,
     COLUMNS,
     LEVELS,
     PLACES,
+    PRICED,
     ROW_NODE,
     ROW_NODES,
     ROWS,
     SHORT,
     TALL,
-    ask,
     begin_tile,
     fill_lengths,
     make_scratch,
+    next_candidates,
     smooth_parts,
     smoothness,
-    take,
+    take_prices,
 )
 from tests.space.in_python import in_python  # noqa: F401  (a fixture)
 
@@ -45,19 +45,19 @@ def distance(p, q):
     return np.hypot(*(q - p).T)
 
 
-def tile(grids, function, chosen=None, error=ERROR, modes=lambda p, q: np.zeros(len(p), dtype=np.int64)):
+def tile(grids, function, chosen=None, error=ERROR):
     """All values of the first tile, of one that is worth `error`; and how many were computed."""
     chosen = chosen or (np.arange(len(grids[0])), np.arange(len(grids[1])))
     known = smoothness(grids, chosen)
-    plan, level, rows, columns, _, asked, trace, buffer = make_scratch.py_func()
+    scratch = make_scratch.py_func()
+    plan, _, rows, columns, _, found, _ = scratch
     price = np.full(PLACES, np.inf)
-    begin_tile(error, plan, level)
-    while ask(known, 0, 0, plan, level, rows, columns):
+    begin_tile(error, scratch)
+    while next_candidates(known, 0, 0, scratch):
         i, j = np.repeat(rows[: plan[ROWS]], plan[COLUMNS]), np.tile(columns[: plan[COLUMNS]], plan[ROWS])
-        asked[: len(i)] = function(grids[0][i], grids[1][j])
-        trace[: len(i)] = modes(grids[0][i], grids[1][j])
-        take(known, 0, 0, error, plan, level, rows, columns, asked, trace, buffer, price)
-    return price.reshape(TALL, BROAD), int(plan[ASKED])
+        found[: len(i)] = function(grids[0][i], grids[1][j])
+        take_prices(known, 0, 0, error, scratch, price)
+    return price.reshape(TALL, BROAD), int(plan[PRICED])
 
 
 def every(grids, function):
@@ -76,15 +76,15 @@ def assert_equal(found, wanted, error=ERROR):
 
 @pytest.mark.usefixtures("in_python")
 def test_a_smooth_tile_follows_from_a_few_of_its_candidates():
-    found, asked = tile(dense(), distance)
-    assert asked == ROW_NODES * COLUMN_NODES
+    found, computed = tile(dense(), distance)
+    assert computed == ROW_NODES * COLUMN_NODES
     assert_equal(found, every(dense(), distance))
 
 
 @pytest.mark.usefixtures("in_python")
 def test_where_nothing_may_be_off_all_are_computed():
-    found, asked = tile(dense(), distance, error=0.0)
-    assert asked == PLACES
+    found, computed = tile(dense(), distance, error=0.0)
+    assert computed == PLACES
     assert np.array_equal(found, every(dense(), distance))
 
 
@@ -92,16 +92,16 @@ def test_where_nothing_may_be_off_all_are_computed():
 @pytest.mark.parametrize("reach", [0.3, 0.5, 1.0, 4.0])
 def test_a_tile_that_is_large_is_halved_or_computed(reach):
     grids = line([0, 0], [reach / 8, 0], TALL), line([0, 1], [reach, 1], BROAD)
-    found, asked = tile(grids, distance)
+    found, computed = tile(grids, distance)
     assert_equal(found, every(grids, distance))
-    assert ROW_NODES * COLUMN_NODES < asked <= PLACES + 2 * LEVELS * TALL * COLUMN_NODES
+    assert ROW_NODES * COLUMN_NODES < computed <= PLACES + 2 * LEVELS * TALL * COLUMN_NODES
 
 
 @pytest.mark.usefixtures("in_python")
 def test_rows_that_are_far_apart_are_computed_at_the_nodes_of_columns():
     grids = line([-1, 0], [1, 0], TALL), line([0, 1], [0.02, 1.01], BROAD)
-    found, asked = tile(grids, distance)
-    assert asked == (ROW_NODES + TALL) * COLUMN_NODES
+    found, computed = tile(grids, distance)
+    assert computed == (ROW_NODES + TALL) * COLUMN_NODES
     assert_equal(found, every(grids, distance))
 
 
@@ -114,36 +114,21 @@ def test_a_kink_is_found_wherever_it_runs(place):
     def kinked(p, q):
         return distance(p, q) + 1e-3 * np.maximum((p + q - at) @ np.array([3.0, 1.0]), 0.0)
 
-    found, asked = tile(grids, kinked)
+    found, computed = tile(grids, kinked)
     assert_equal(found, every(grids, kinked), 20 * ERROR)
-    assert asked < PLACES
-
-
-@pytest.mark.usefixtures("in_python")
-def test_members_that_go_through_other_modes_are_not_interpolated_between():
-    grids = dense()
-
-    def jump(p, q):
-        return (q[:, 0] - p[:, 0] > 0.205).astype(np.int64)
-
-    def jumped(p, q):
-        return distance(p, q) + 1e-14 * jump(p, q)
-
-    found, asked = tile(grids, jumped, modes=jump)
-    assert_equal(found, every(grids, jumped))
-    assert ROW_NODES * COLUMN_NODES < asked < PLACES
+    assert computed < PLACES
 
 
 @pytest.mark.usefixtures("in_python")
 @pytest.mark.parametrize(("rows", "columns"), [(TALL, 100), (5, BROAD), (1, 1), (3, SHORT + 3), (TALL, 7)])
 def test_tiles_at_the_edge_of_a_grid_have_all_their_candidates(rows, columns):
     grids = tuple(grid[:n] for grid, n in zip(dense(), (rows, columns), strict=True))
-    found, asked = tile(grids, distance)
+    found, computed = tile(grids, distance)
     assert_equal(found, every(grids, distance))
     # 100 are 64, 32, and four that are priced one by one
     parts = [BROAD >> level for level in range(LEVELS) if columns & (BROAD >> level)]
     left = -(-(columns - sum(parts)) // WIDE) * WIDE
-    assert asked == (ROW_NODES if rows == TALL else rows) * COLUMN_NODES * len(parts) + rows * left
+    assert computed == (ROW_NODES if rows == TALL else rows) * COLUMN_NODES * len(parts) + rows * left
 
 
 @pytest.mark.usefixtures("in_python")
@@ -152,14 +137,14 @@ def test_grids_with_corners_and_arcs_and_parts_of_grids():
     arc = 1.5 * np.stack([np.cos(t), np.sin(t)], axis=1)
     corner = np.concatenate([line([1, 1], [1, 1.02], 90), line([1.0005, 1.02], [1.02, 1.02], 38)])
     for second, most in ((arc, ROW_NODES * COLUMN_NODES), (corner, PLACES // 3)):
-        found, asked = tile((dense()[0], second), distance)
+        found, computed = tile((dense()[0], second), distance)
         assert_equal(found, every((dense()[0], second), distance))
-        assert asked <= most
+        assert computed <= most
     chosen = np.arange(TALL) * 37 // TALL, np.arange(BROAD) * 200 // BROAD
     whole = line([0, 0], [0.01, 0.005], 37), line([0.2, 1], [0.22, 1.01], 200)
     grids = whole[0][chosen[0]], whole[1][chosen[1]]
-    found, asked = tile(grids, distance, chosen)
-    assert asked == ROW_NODES * COLUMN_NODES
+    found, computed = tile(grids, distance, chosen)
+    assert computed == ROW_NODES * COLUMN_NODES
     assert_equal(found, every(grids, distance))
 
 
