@@ -94,7 +94,7 @@ _ERRORS: Any = errors
 # or array that has just been put together is known.
 #
 # Numbers that index an array in C order become an address from the array's fields, not from a copy of them in memory.
-# So does another shape of one that a function got.
+# So does another shape of one that a function got. A computed place does not count from the end.
 
 #: places of an array's fields in Numba's structure of it
 _HOLDER, _PARENT, _COUNT, _SIZE, _DATA, _SHAPE, _STRIDES = range(7)
@@ -218,7 +218,7 @@ class Lower(NumbaLower):
 
         Nor where the variable may also hold None: then it is more than the array.
         """
-        if not isinstance(array, types.Array) or array.layout != "C" or self.context.enable_boundscheck:
+        if not isinstance(array, types.Array) or array.layout != "C":
             return ()
         if isinstance(self.typeof(name), types.Optional):
             return ()
@@ -237,9 +237,23 @@ class Lower(NumbaLower):
         """Where the item is, or the first one of the view; the arithmetic is Numba's own."""
         build = self.builder
         shape = [build.extract_value(given, [_SHAPE, k]) for k in range(array.ndim)]
-        places = [fix_integer_index(self.context, build, *each) for each in zip(kinds, index, shape, strict=False)]
+        places = [self._place(*each) for each in zip(kinds, index, shape, strict=False)]
         data = build.extract_value(given, _DATA)
         return cgutils.get_item_pointer2(self.context, build, data, shape, (), "C", places)
+
+    def _place(self, kind: Any, index: Any, length: Any) -> Any:
+        """A place along one dimension. One that is written as a number may count from the end, a computed one may not.
+
+        Code that asks of every place whether it counts from the end keeps loops from reading and writing vectors.
+        With NUMBA_BOUNDSCHECK=1 a place outside of the array raises IndexError.
+        """
+        if isinstance(index, llvm_ir.Constant):
+            place = fix_integer_index(self.context, self.builder, kind, index, length)
+        else:
+            place = self.context.cast(self.builder, index, kind, types.intp)
+        if self.context.enable_boundscheck:
+            cgutils.do_boundscheck(self.context, self.builder, place, length)
+        return place
 
     def _view(self, kind: Any, given: Any, address: Any) -> Any:
         """The array of the last dimensions of another."""
@@ -1705,7 +1719,7 @@ def _probe_inner(x: Any, k: int) -> Any:
     made = np.zeros((3, x.shape[0]))
     for i in range(x.shape[0]):
         made[1, i] = k * x[i]
-        made[-1, -i] = made[1][i] + 1.0
+        made[-1, i] = made[1][i] + 1.0
     return made[1]
 
 

@@ -32,7 +32,14 @@ PROCESSORS = {
 }
 _COMPILER = ("numba", "llvmlite", "numpy")
 #: what decides for which processor, and how, kernels are compiled
-SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")
+SETTINGS = (
+    "NUMBA_OPT",
+    "NUMBA_CPU_NAME",
+    "NUMBA_CPU_FEATURES",
+    "NUMBA_ENABLE_AVX",
+    "NUMBA_LOOP_VECTORIZE",
+    "NUMBA_BOUNDSCHECK",
+)
 _MAGIC = b"mdstopo code 4\n"
 #: folders of other sources and versions: how many are kept, and how long after their last use, in seconds
 _KEPT, _LASTING = 12, 30 * 86400.0

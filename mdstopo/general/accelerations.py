@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.places import index
 from mdstopo.general.forces import add_inerters, add_tangents_of_inerters, general_forces
 from mdstopo.general.general_model import JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
 from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
@@ -175,8 +174,8 @@ def gather(model, j, x, out):
     a = first_freedom(model, model.joint[j, JOINT_FIRST])
     b = first_freedom(model, model.joint[j, JOINT_SECOND])
     for i in range(each):
-        out[index(i)] = x[index(a + i)]
-        out[index(each + i)] = x[index(b + i)]
+        out[i] = x[a + i]
+        out[each + i] = x[b + i]
 
 
 @part
@@ -467,7 +466,7 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
     drive_acceleration(model, segment, t, known)
     force = workspace.f
     for d in range(n):
-        a[index(d)] = force[index(d)]
+        a[d] = force[d]
     if model.driven.shape[0] > 0 and workspace.switches[DIAGONAL] == 0:
         for p in range(model.pair.shape[0]):
             for i in range(pair_freedoms(model)):
@@ -582,15 +581,15 @@ def turns_vjp(model, turn, z, bar_q, bar_v):
     for first in range(0, z.shape[0], freedoms(model)):
         own = first + freedoms(model) - turns
         for r in range(turns):
-            value = bar_q[index(own + r)]
+            value = bar_q[own + r]
             for d in range(first, first + freedoms(model)):
-                value += turn[index(d), index(r)] * z[index(d)]
-            bar_q[index(own + r)] = value
+                value += turn[d, r] * z[d]
+            bar_q[own + r] = value
         for r in range(turns, load_slopes(model)):
-            value = bar_v[index(own + r - turns)]
+            value = bar_v[own + r - turns]
             for d in range(first, first + freedoms(model)):
-                value += turn[index(d), index(r)] * z[index(d)]
-            bar_v[index(own + r - turns)] = value
+                value += turn[d, r] * z[d]
+            bar_v[own + r - turns] = value
 
 
 @kernel

@@ -18,7 +18,6 @@ part in it (`weakest`).
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.places import index
 from mdstopo.general.strides import pair_freedoms, place_in_joint
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, most_rows
 
@@ -72,17 +71,17 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
     weighed = pull.reshape(pull.size)
     whole = spread.reshape(spread.size)
     for e in range(slope.shape[0]):
-        weighed[index(e)] = slope[index(e)] * whole[index(e)]
+        weighed[e] = slope[e] * whole[e]
     constant = model.schur_constant
     for e in range(gram.shape[0]):
-        gram[index(e)] = constant[index(e)]
+        gram[e] = constant[e]
     for m in range(product.shape[0]):
-        entry = index(product[index(m), 0])
-        one = product[index(m), 1]
-        two = product[index(m), 2]
+        entry = product[m, 0]
+        one = product[m, 1]
+        two = product[m, 2]
         value = gram[entry]
-        for c in range(product[index(m), 3]):
-            value += slope[index(one + c)] * weighed[index(two + c)]
+        for c in range(product[m, 3]):
+            value += slope[one + c] * weighed[two + c]
         gram[entry] = value
     at = decompose(envelope, gram, diagonal)
     if at < 0 and thorough:
@@ -117,31 +116,31 @@ def in_pairs(envelope, i):
 
     Then both are factorised at once, which is faster: the products of one do not wait for those of the other.
     """
-    return i + 1 < envelope.shape[0] and envelope[index(i + 1), 0] == envelope[index(i), 0]
+    return i + 1 < envelope.shape[0] and envelope[i + 1, 0] == envelope[i, 0]
 
 
 @part
 def _decompose_one(envelope, gram, diagonal, i):
     """Row i of `decompose`. Returns i where the matrix is singular there, else -1."""
     inverse = diagonal[1]
-    first = envelope[index(i), 0]
-    own = envelope[index(i), 1]
+    first = envelope[i, 0]
+    own = envelope[i, 1]
     for j in range(first + 1, i):  # L D
-        other = envelope[index(j), 1]
-        value = gram[index(own + j)]
-        for k in range(max(first, envelope[index(j), 0]), j):
-            value -= gram[index(own + k)] * gram[index(other + k)]
-        gram[index(own + j)] = value
-    whole = gram[index(own + i)]
+        other = envelope[j, 1]
+        value = gram[own + j]
+        for k in range(max(first, envelope[j, 0]), j):
+            value -= gram[own + k] * gram[other + k]
+        gram[own + j] = value
+    whole = gram[own + i]
     value = whole
     for k in range(first, i):
-        scaled = gram[index(own + k)] * inverse[index(k)]
-        value -= gram[index(own + k)] * scaled
-        gram[index(own + k)] = scaled
-    diagonal[0, index(i)] = whole
+        scaled = gram[own + k] * inverse[k]
+        value -= gram[own + k] * scaled
+        gram[own + k] = scaled
+    diagonal[0, i] = whole
     if value <= SINGULAR * whole:  # not where it is NaN: that is no fault of the joints
         return i
-    inverse[index(i)] = 1.0 / value
+    inverse[i] = 1.0 / value
     return -1
 
 
@@ -149,43 +148,43 @@ def _decompose_one(envelope, gram, diagonal, i):
 def _decompose_two(envelope, gram, diagonal, i):
     """Rows i and i + 1 of `decompose`. Returns the one at which the matrix is singular, or -1."""
     inverse = diagonal[1]
-    first = envelope[index(i), 0]
-    own = envelope[index(i), 1]
-    following = envelope[index(i + 1), 1]
+    first = envelope[i, 0]
+    own = envelope[i, 1]
+    following = envelope[i + 1, 1]
     for j in range(first + 1, i):
-        other = envelope[index(j), 1]
-        value = gram[index(own + j)]
-        second = gram[index(following + j)]
-        for k in range(max(first, envelope[index(j), 0]), j):
-            factor = gram[index(other + k)]
-            value -= gram[index(own + k)] * factor
-            second -= gram[index(following + k)] * factor
-        gram[index(own + j)] = value
-        gram[index(following + j)] = second
-    whole = gram[index(own + i)]
-    whole_second = gram[index(following + i + 1)]
+        other = envelope[j, 1]
+        value = gram[own + j]
+        second = gram[following + j]
+        for k in range(max(first, envelope[j, 0]), j):
+            factor = gram[other + k]
+            value -= gram[own + k] * factor
+            second -= gram[following + k] * factor
+        gram[own + j] = value
+        gram[following + j] = second
+    whole = gram[own + i]
+    whole_second = gram[following + i + 1]
     value = whole
-    both = gram[index(following + i)]
+    both = gram[following + i]
     second = whole_second
     for k in range(first, i):
-        scaled = gram[index(own + k)] * inverse[index(k)]
-        scaled_second = gram[index(following + k)] * inverse[index(k)]
-        value -= gram[index(own + k)] * scaled
-        both -= gram[index(following + k)] * scaled
-        second -= gram[index(following + k)] * scaled_second
-        gram[index(own + k)] = scaled
-        gram[index(following + k)] = scaled_second
-    diagonal[0, index(i)] = whole
-    diagonal[0, index(i + 1)] = whole_second
+        scaled = gram[own + k] * inverse[k]
+        scaled_second = gram[following + k] * inverse[k]
+        value -= gram[own + k] * scaled
+        both -= gram[following + k] * scaled
+        second -= gram[following + k] * scaled_second
+        gram[own + k] = scaled
+        gram[following + k] = scaled_second
+    diagonal[0, i] = whole
+    diagonal[0, i + 1] = whole_second
     if value <= SINGULAR * whole:
         return i
-    inverse[index(i)] = 1.0 / value
-    scaled = both * inverse[index(i)]
-    gram[index(following + i)] = scaled
+    inverse[i] = 1.0 / value
+    scaled = both * inverse[i]
+    gram[following + i] = scaled
     second -= both * scaled
     if second <= SINGULAR * whole_second:
         return i + 1
-    inverse[index(i + 1)] = 1.0 / second
+    inverse[i + 1] = 1.0 / second
     return -1
 
 
@@ -204,13 +203,13 @@ def growth(envelope, gram, diagonal, x):
     most = 0.0
     worst = 0
     for i in range(envelope.shape[0]):
-        own = envelope[index(i), 1]
+        own = envelope[i, 1]
         value = 0.0
-        for k in range(envelope[index(i), 0], i):
-            value -= gram[index(own + k)] * x[index(k)]
-        whole = np.sqrt(diagonal[0, index(i)])
-        x[index(i)] = value + (whole if value >= 0.0 else -whole)
-        square = x[index(i)] * x[index(i)] * diagonal[1, index(i)]
+        for k in range(envelope[i, 0], i):
+            value -= gram[own + k] * x[k]
+        whole = np.sqrt(diagonal[0, i])
+        x[i] = value + (whole if value >= 0.0 else -whole)
+        square = x[i] * x[i] * diagonal[1, i]
         size += square
         if square > most:
             most = square
@@ -248,27 +247,27 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
     count = line.shape[0]
     each = freedoms(model)
     for r in range(count):
-        e = line[index(r), 0]
-        one = line[index(r), 1]
-        two = line[index(r), 2]
+        e = line[r, 0]
+        one = line[r, 1]
+        two = line[r, 2]
         first = 0.0
         second = 0.0
         for i in range(each):
-            first += weighed[index(e + i)] * a[index(one + i)]
-            second += weighed[index(e + each + i)] * a[index(two + i)]
-        x[index(line[index(r), 3])] = first + second - lam[index(r)]
+            first += weighed[e + i] * a[one + i]
+            second += weighed[e + each + i] * a[two + i]
+        x[line[r, 3]] = first + second - lam[r]
     substitute(envelope, gram, diagonal, x)
     for d in range(a.shape[0]):
-        a[index(d)] *= inverse[index(d)]
+        a[d] *= inverse[d]
     for r in range(count):
-        e = line[index(r), 0]
-        one = line[index(r), 1]
-        two = line[index(r), 2]
-        value = x[index(line[index(r), 3])]
-        lam[index(r)] = value
+        e = line[r, 0]
+        one = line[r, 1]
+        two = line[r, 2]
+        value = x[line[r, 3]]
+        lam[r] = value
         for i in range(each):
-            a[index(one + i)] -= weighed[index(e + i)] * value
-            a[index(two + i)] -= weighed[index(e + each + i)] * value
+            a[one + i] -= weighed[e + i] * value
+            a[two + i] -= weighed[e + each + i] * value
 
 
 @kernel
@@ -278,29 +277,29 @@ def substitute(envelope, gram, diagonal, x):
     i = 0
     while i < count:
         together = in_pairs(envelope, i)
-        own = envelope[index(i), 1]
-        following = envelope[index(i + 1), 1] if together else own
-        value = x[index(i)]
-        second = x[index(i + 1)] if together else 0.0
-        for k in range(envelope[index(i), 0], i):
-            value -= gram[index(own + k)] * x[index(k)]
-            second -= gram[index(following + k)] * x[index(k)]
-        x[index(i)] = value
+        own = envelope[i, 1]
+        following = envelope[i + 1, 1] if together else own
+        value = x[i]
+        second = x[i + 1] if together else 0.0
+        for k in range(envelope[i, 0], i):
+            value -= gram[own + k] * x[k]
+            second -= gram[following + k] * x[k]
+        x[i] = value
         if together:
-            x[index(i + 1)] = second - gram[index(following + i)] * value
+            x[i + 1] = second - gram[following + i] * value
         i += 2 if together else 1
     for i in range(count):
-        x[index(i)] *= diagonal[1, index(i)]
+        x[i] *= diagonal[1, i]
     i = count
     while i > 0:
         together = i > 1 and in_pairs(envelope, i - 2)
-        following = envelope[index(i - 1), 1]
-        second = x[index(i - 1)]
+        following = envelope[i - 1, 1]
+        second = x[i - 1]
         i -= 2 if together else 1
-        own = envelope[index(i), 1]
+        own = envelope[i, 1]
         value = 0.0
         if together:
-            value = x[index(i)] - gram[index(following + i)] * second
-            x[index(i)] = value
-        for k in range(envelope[index(i), 0], i):
-            x[index(k)] -= gram[index(own + k)] * value + gram[index(following + k)] * second
+            value = x[i] - gram[following + i] * second
+            x[i] = value
+        for k in range(envelope[i, 0], i):
+            x[k] -= gram[own + k] * value + gram[following + k] * second

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.places import index
 from mdstopo.general.general_model import GeneralModel
 from mdstopo.general.members import MODE, SET
 from mdstopo.general.structures import bundle
@@ -184,7 +183,7 @@ def keep_stage(model, history, o, t, q, v, a, lam, workspace, tangent):
         for r in range(model.row_layout.shape[0]):  # joints have room for more rows than most have
             first = model.row_layout[r, 0]
             for i in range(first, first + workspace.pull.shape[2]):
-                kept_pull[index(i)] = pull[index(i)]
+                kept_pull[i] = pull[i]
         copy_vector(workspace.gram, history.gram[o])
         _copy(workspace.diagonal, history.diagonal[o])
 
@@ -274,4 +273,4 @@ def events_included(member_state):
 def copy_vector(source, target):
     """Copy a vector: target = source."""
     for i in range(source.shape[0]):
-        target[index(i)] = source[index(i)]
+        target[i] = source[i]

@@ -13,7 +13,6 @@ digits of members that hardly stretch.
 import math
 
 from mdstopo.compiler.jit import part
-from mdstopo.compiler.places import index
 from mdstopo.scene.springs_model import HOME_COS, HOME_SIN, HOME_X, HOME_Y
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A, then what has changed since
@@ -128,7 +127,7 @@ def copy_rows(source, target):
         one = source[i]
         other = target[i]
         for j in range(source.shape[1]):
-            other[index(j)] = one[index(j)]
+            other[j] = one[j]
 
 
 @part

@@ -12,7 +12,6 @@ the turning rate in the turned frame is
 import math
 
 from mdstopo.compiler.jit import part
-from mdstopo.compiler.places import index
 from mdstopo.mechanics.kinematics.vectors import cross, dot, minus, plus, times
 
 #: squared angle below which what loses digits in closed form is summed as a series
@@ -22,7 +21,7 @@ SMALL = 0.1
 @part
 def quaternion_at(q, i):
     """The quaternion that stands at place i of q."""
-    return q[index(i)], q[index(i + 1)], q[index(i + 2)], q[index(i + 3)]
+    return q[i], q[i + 1], q[i + 2], q[i + 3]
 
 
 @part

@@ -6,7 +6,6 @@ Moments on a body are in its principal axes: its turning rate follows J omega' +
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.places import index
 from mdstopo.compiler.vector import lanes, load, store
 from mdstopo.mechanics.kinematics.spatial_poses import (
     D_RATE,
@@ -66,7 +65,7 @@ def add_loads(model, segment, t, q, v, f):
     tau = t - model.times[segment]
     force = model.force[segment]
     for i in range(force.shape[0]):
-        f[index(i)] += force[index(i), 0] + tau * force[index(i), 1]
+        f[i] += force[i, 0] + tau * force[i, 1]
     for body in range(model.home.shape[0]):
         d = FREEDOMS * body
         omega = vector_at(v, d + 3)
@@ -137,7 +136,7 @@ def load_tangent(model, segment, t, q, v, turn):
             e = unit(c)
             slope = minus(cross(spin, e), cross(omega, _inertia_times(model, d, e)))
             for i in range(3):
-                turn[index(d + 3 + i), index(ROTATIONS + c)] = slope[i]
+                turn[d + 3 + i, ROTATIONS + c] = slope[i]
     if model.load_body.shape[0] == 0 and model.timed_load.shape[0] == 0:
         return
     for k in range(model.load_body.shape[0]):
@@ -346,7 +345,7 @@ def pair_matrix_vjp(model, p, m, z, bar):
             own = FREEDOMS * model.pair[p, i]
             for r in range(FREEDOMS):
                 row = m[FREEDOMS * i + r]
-                along = z[index(own + r)]
+                along = z[own + r]
                 push = plus(push, times(along, vector_at(row, first)))
                 moment = plus(moment, times(along, vector_at(row, first + 3)))
         put(bar, at, minus(vector_at(bar, at), push))

@@ -12,7 +12,6 @@ that hardly stretch.
 """
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.places import index
 from mdstopo.mechanics.kinematics.vectors import (
     add,
     column_of,
@@ -51,8 +50,8 @@ def fill_attitude(home, body, q, out, at):
     for c in range(3):
         since = first if c == 0 else second if c == 1 else third
         for r in range(3):
-            out[index(at + TURN_SINCE + 3 * r + c)] = since[r]
-            out[index(at + TURN + 3 * r + c)] = h[index(HOME_TURN + 3 * r + c)] + since[r]
+            out[at + TURN_SINCE + 3 * r + c] = since[r]
+            out[at + TURN + 3 * r + c] = h[HOME_TURN + 3 * r + c] + since[r]
 
 
 @part
@@ -63,7 +62,7 @@ def _turned_since(h, body, q):
     h (HOME,): the body at home. body: its number. q (n_q,): coordinates.
     """
     b = COORDINATES * body + 3
-    w, x, y, z = q[index(b)], q[index(b + 1)], q[index(b + 2)], q[index(b + 3)]
+    w, x, y, z = q[b], q[b + 1], q[b + 2], q[b + 3]
     first = (-2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
     second = (2.0 * (x * y - w * z), -2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
     third = (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), -2.0 * (x * x + y * y))
@@ -124,10 +123,10 @@ def fill_pose(model, p, attitude_a, attitude_b, q, v, r):
             turned_back(home_a, HOME_TURN, column_of(attitude_b, TURN_SINCE, c)),
         )
         for i in range(3):
-            r[index(S + 3 * i + c)] = whole[i]
-            r[index(S_SINCE + 3 * i + c)] = since[i]
+            r[S + 3 * i + c] = whole[i]
+            r[S_SINCE + 3 * i + c] = since[i]
     for i in range(9):
-        r[index(TURN_A + i)] = attitude_a[index(TURN + i)]
+        r[TURN_A + i] = attitude_a[TURN + i]
     a = FREEDOMS * one
     b = FREEDOMS * two
     omega = vector_at(v, a + 3)

@@ -11,7 +11,6 @@ Backwards, with u_i the cotangent of the turn of stage i, g_i that of its turnin
 """
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.places import index
 from mdstopo.mechanics.kinematics.planar_steps import BY_RATE, BY_STAGE, END, END_RATE, NODES, VECTORS, hermite
 from mdstopo.mechanics.kinematics.rotations import (
     exponential,
@@ -34,10 +33,10 @@ from mdstopo.mechanics.kinematics.vectors import add, dot, minus, plus, put, tim
 @part
 def put_quaternion(q, i, e):
     """q[i : i + 4] = e."""
-    q[index(i)] = e[0]
-    q[index(i + 1)] = e[1]
-    q[index(i + 2)] = e[2]
-    q[index(i + 3)] = e[3]
+    q[i] = e[0]
+    q[i + 1] = e[1]
+    q[i + 2] = e[2]
+    q[i + 3] = e[3]
 
 
 @part
@@ -208,7 +207,7 @@ def stage_state(model, table, h, i, q0, v0, q, v, a, slopes):
         add_row(h * h * table[BY_STAGE, i, j], a[j], own)
     velocity = v[i]
     for d in range(v0.shape[0]):
-        velocity[index(d)] = v0[index(d)]
+        velocity[d] = v0[d]
     for body in range(v0.shape[0] // FREEDOMS):
         c = COORDINATES * body
         d = FREEDOMS * body
@@ -230,7 +229,7 @@ def add_row(w, row, out):
     """out += w row, unless w is 0; as a loop of its own it is done in vectors."""
     if w != 0.0:
         for d in range(out.shape[0]):
-            out[index(d)] += w * row[index(d)]
+            out[d] += w * row[d]
 
 
 @kernel
@@ -279,7 +278,7 @@ def _slope_bars(table, h, i, u, out):
     end = u[0]
     w = h * table[VECTORS, END_RATE, i]
     for d in range(out.shape[0]):
-        out[index(d)] = w * end[index(d)]
+        out[d] = w * end[d]
     for m in range(i + 1, u.shape[0]):
         add_row(h * table[BY_RATE, m, i], u[m], out)
 
@@ -312,7 +311,7 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
     by_end_rate = h * table[VECTORS, END_RATE, j]
     by_end = h * h * table[VECTORS, END, j]
     for d in range(n):
-        z[index(d)] = by_end * lam_q[index(d)]
+        z[d] = by_end * lam_q[d]
     for i in range(j + 1, s):
         add_row(h * h * table[BY_STAGE, i, j], u[i], z)
     for body in range(n // FREEDOMS):  # positions alone depend on accelerations in this way

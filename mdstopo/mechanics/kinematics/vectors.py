@@ -6,29 +6,28 @@ A vector is a tuple, which costs no memory. A turning matrix R stands in `m[i : 
 import math
 
 from mdstopo.compiler.jit import part
-from mdstopo.compiler.places import index
 
 
 @part
 def vector_at(x, i):
     """The vector that stands at place i of x."""
-    return x[index(i)], x[index(i + 1)], x[index(i + 2)]
+    return x[i], x[i + 1], x[i + 2]
 
 
 @part
 def put(x, i, a):
     """Write a vector into three entries of x: x[i : i + 3] = a."""
-    x[index(i)] = a[0]
-    x[index(i + 1)] = a[1]
-    x[index(i + 2)] = a[2]
+    x[i] = a[0]
+    x[i + 1] = a[1]
+    x[i + 2] = a[2]
 
 
 @part
 def add(x, i, a):
     """Add a vector to three entries of x: x[i : i + 3] += a."""
-    x[index(i)] += a[0]
-    x[index(i + 1)] += a[1]
-    x[index(i + 2)] += a[2]
+    x[i] += a[0]
+    x[i + 1] += a[1]
+    x[i + 2] += a[2]
 
 
 @part
@@ -71,9 +70,9 @@ def norm(a):
 def turned(m, i, a):
     """R a for the matrix R at place i of m."""
     return (
-        m[index(i)] * a[0] + m[index(i + 1)] * a[1] + m[index(i + 2)] * a[2],
-        m[index(i + 3)] * a[0] + m[index(i + 4)] * a[1] + m[index(i + 5)] * a[2],
-        m[index(i + 6)] * a[0] + m[index(i + 7)] * a[1] + m[index(i + 8)] * a[2],
+        m[i] * a[0] + m[i + 1] * a[1] + m[i + 2] * a[2],
+        m[i + 3] * a[0] + m[i + 4] * a[1] + m[i + 5] * a[2],
+        m[i + 6] * a[0] + m[i + 7] * a[1] + m[i + 8] * a[2],
     )
 
 
@@ -81,9 +80,9 @@ def turned(m, i, a):
 def turned_back(m, i, a):
     """R^T a for the matrix R at place i of m."""
     return (
-        m[index(i)] * a[0] + m[index(i + 3)] * a[1] + m[index(i + 6)] * a[2],
-        m[index(i + 1)] * a[0] + m[index(i + 4)] * a[1] + m[index(i + 7)] * a[2],
-        m[index(i + 2)] * a[0] + m[index(i + 5)] * a[1] + m[index(i + 8)] * a[2],
+        m[i] * a[0] + m[i + 3] * a[1] + m[i + 6] * a[2],
+        m[i + 1] * a[0] + m[i + 4] * a[1] + m[i + 7] * a[2],
+        m[i + 2] * a[0] + m[i + 5] * a[1] + m[i + 8] * a[2],
     )
 
 
@@ -106,13 +105,13 @@ def by_columns(m, a):
 @part
 def row_of(m, i, k):
     """Row k of the matrix at place i of m."""
-    return m[index(i + 3 * k)], m[index(i + 3 * k + 1)], m[index(i + 3 * k + 2)]
+    return m[i + 3 * k], m[i + 3 * k + 1], m[i + 3 * k + 2]
 
 
 @part
 def column_of(m, i, k):
     """Column k of the matrix at place i of m."""
-    return m[index(i + k)], m[index(i + k + 3)], m[index(i + k + 6)]
+    return m[i + k], m[i + k + 3], m[i + k + 6]
 
 
 @part
