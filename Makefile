@@ -6,6 +6,7 @@
 #   make test-times               the tests, and where their time goes: by test, file and compiled kernel
 #   make test-lowest              all of them with the lowest versions of dependencies that pyproject.toml allows
 #   make test-numba               kernels, gradients and warm starts with the oldest, a middle and the newest Numba
+#   make test-bounds              the tests of kernels, with every place in an array checked
 #   make lint, make types         ruff, and who may import whom; mypy
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
@@ -25,6 +26,8 @@ LOWEST ?= .venv-lowest
 # environments of `make test-numba`, one for each version: the lower bound of pyproject.toml, one between, the newest
 NUMBAS ?= oldest 0.64 newest
 NUMBA_VENVS ?= .venv-numba
+# tests of `make test-bounds`, and of `make test-numba`
+BOUNDS_TESTS ?= tests/mechanics tests/general tests/integrators tests/sensitivity tests/engine/test_gradients.py
 NUMBA_TESTS ?= tests/compiler tests/mechanics tests/engine/test_gradients.py
 BIN := $(VENV)/bin
 CASE ?= cases/fig6.yaml
@@ -43,7 +46,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test test-all test-times test-lowest test-numba lint types docs reproduce gallery bench peers readme wheel try-wheel clean
+.PHONY: help run test test-all test-times test-lowest test-numba test-bounds lint types docs reproduce gallery bench peers readme wheel try-wheel clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,19p
@@ -124,6 +127,9 @@ test-numba: $(foreach version,$(NUMBAS),$(NUMBA_VENVS)/$(version)/.ready)
 	  $$place/bin/python -m pytest --numprocesses $(JOBS) --dist loadfile $(or $(TESTS),$(NUMBA_TESTS)) || failed="$$failed $$version"; \
 	done; \
 	if [ -n "$$failed" ]; then echo "failed with Numba$$failed"; exit 1; fi
+
+test-bounds: $(VENV)/.ready-dev
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(or $(TESTS),$(BOUNDS_TESTS))
 
 lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .

@@ -64,10 +64,10 @@ def outliving(n, rounds, given, out):
 
 @entry
 def indexed(cube, flags, k, out):
-    """Numbers from the front and from the end, in all dimensions and in the first ones."""
+    """Numbers from the front and, where they are written, from the end, in all dimensions and in the first ones."""
     i = np.uint64(1)
-    out[0] = cube[1, -1, k] + cube[-1][0][-k] + cube[i, 0, 1]
-    sheet = cube[k - 3]
+    out[0] = cube[1, -1, k] + cube[-1][0][-2] + cube[i, 0, 1]
+    sheet = cube[k - 1]
     row = sheet[-1]
     row[0] = 7.0
     sheet[0, -1] += 2.0
@@ -96,6 +96,30 @@ def test_numbers_index_as_in_python():
         results.append((cube, flags, out))
     for compiled, written in zip(*results, strict=True):
         np.testing.assert_array_equal(compiled, written)
+
+
+@entry
+def item(x, i):
+    """One number, at a computed place."""
+    return x[0, i]
+
+
+@entry
+def last_of_row(x, i):
+    """The last number of a row whose place is computed."""
+    return x[i, -1]
+
+
+@pytest.mark.parametrize(("read", "place"), [(item, 3), (item, -1), (last_of_row, 2), (last_of_row, -1)])
+def test_a_place_outside_of_the_array_is_told_where_places_are_checked(read, place, monkeypatch):
+    # a computed place does not count from the end: without the check, these read what lies beside the array
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    if not has_own_passes():
+        pytest.skip("this version's own code counts from the end")
+    x = np.arange(6.0).reshape(2, 3)
+    assert read(x, 1) == read.py_func(x, 1)
+    with pytest.raises(IndexError):
+        read(x, place)
 
 
 @entry
