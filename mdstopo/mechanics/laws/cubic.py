@@ -15,9 +15,10 @@ def cubic_force(p, x):
 @inline
 def cubic_slopes(p, place, x):
     """Slopes of force and energy by a parameter: df/dp, dV/dp."""
+    square = x * x
     if place == 0:
-        return x, 0.5 * x * x
-    return x * x * x, 0.25 * x * x * x * x
+        return x, 0.5 * square
+    return square * x, 0.25 * square * square
 
 
 KERNELS = LawKernels(force=cubic_force, slopes=cubic_slopes)
