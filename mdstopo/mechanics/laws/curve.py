@@ -82,9 +82,11 @@ def curve_margin(p, x, mode, curves):
     """How far the elongation x is from the end of its piece of the curve (m)."""
     at = int(p[0])
     n = int(p[1])
+    if mode <= 0:
+        return np.inf
     below = x - curves[at + mode - 2] if mode > 1 else np.inf
     above = curves[at + mode - 1] - x if mode <= n else np.inf
-    return min(below, above) + p[3] if mode > 0 else np.inf
+    return min(below, above) + p[3]
 
 
 @inline
