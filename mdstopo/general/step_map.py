@@ -270,11 +270,10 @@ def carry_states(step, count, fresh, states):
                 second += x * step.by_state[index(b), index(two)]
                 third += x * step.by_state[index(b), index(three)]
                 fourth += x * step.by_state[index(b), index(four)]
-            at = vector * (width + d)
-            store(room, at, first)
-            store(room, at + vector, second)
-            store(room, at + 2 * vector, third)
-            store(room, at + 3 * vector, fourth)
+            store(room, vector * (width + d), first)
+            store(room, vector * (width + d + 1), second)
+            store(room, vector * (width + d + 2), third)
+            store(room, vector * (width + d + 3), fourth)
         for d in range(width):
             store(flat, d * columns + i, load(room, vector * (width + d)))
         if count > width:
