@@ -95,7 +95,7 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
             ),
         ),
     ),
-    ("gradients", (Box(("sensitivity",), "adjoint, direct, iterative, constant_load", 0.0, 0.66, "4", _SPRINGS),)),
+    ("gradients", (Box(("sensitivity",), "adjoint, prices of candidates", 0.0, 0.66, "4", _SPRINGS),)),
     ("objectives", (Box(("responses",), "energy, peaks, points of bodies", 0.0, 0.66, "4", _SPRINGS),)),
     ("motion", (Box(("integrators",), "gauss, runge_kutta, generalized_alpha", 0.0, 0.66, "3", _SPRINGS),)),
     ("forces", (Box(("mechanics",), "relative poses, laws of members, joints, sums over members"),)),

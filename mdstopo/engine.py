@@ -17,6 +17,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, SMOOTH, STIFF
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
 from mdstopo.case.sensitivities import SENSITIVITIES, chosen
+from mdstopo.case.sensitivities import having as methods_having
 from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.integrator_choice import choose, method_of
@@ -50,8 +51,8 @@ LOOSEST = 5e-5
 #: seconds that a load case takes from which on a thread of its own pays: one costs a tenth of that
 WORTH_A_THREAD = 1e-3
 
-#: steps that a time history has at least
-HISTORY = 50
+#: steps that a time history has at least, and the method that has derivatives at every one of them
+HISTORY, (HISTORIES,) = 50, methods_having("of_histories")
 
 
 class Evaluator:
@@ -169,8 +170,9 @@ class Evaluator:
                 [self.case.marks.mistake(*no_derivatives(self.case, method))],
                 str(self.case.path or self.case.name),
             )
-        if method in self._lacking:
-            return self.otherwise(sensitivity=method).evaluate(alpha, gradient, method, rows)
+        other = self._other_of(method, gradient)
+        if other is not None:
+            return other.evaluate(alpha, gradient, method, rows)
         seen = self._seen  # first: a driver that is made may simulate a design of its own
         stated = self._design.take(alpha)
         design, design_map = self.computed(stated), self._design_map
@@ -195,7 +197,7 @@ class Evaluator:
                 status, diagnosis = self._verdict(name, design, result)
             gradients, across = (result.gradients, result.across) if exact else (None, None)
             if status.ok and gradient and not exact:
-                found = driver.differentiate(method, design, result, rows.cones)
+                found = cast("GeneralDriver", driver).differentiate(method, design, result, rows.cones)
                 status, diagnosis, gradients, across = found.status, found.message, found.gradients, found.across
             work.append(driver.work.tolist())
             message = diagnosis or message
@@ -217,6 +219,15 @@ class Evaluator:
             message = f"a slope of a formula of {where}{', '.join(self._unsure)} is infinite or has no value"
             status = Status.NO_GRADIENT
         return self._evaluation(all_peaks, gradient, work_named(_total(work)), status, message)
+
+    def _other_of(self, method: str, gradient: bool) -> "Evaluator | None":
+        """The evaluator that differentiates by a method in this one's place, None where this one does: the integrator
+        has to be one on whose steps the method is defined, and the kernels those that have the method."""
+        if method in self._lacking:
+            return self.otherwise(sensitivity=method)
+        if self.beyond or not gradient or SENSITIVITIES[method].comes_with_values:
+            return None
+        return self.otherwise(sensitivity=method, integrator=self.integrator)
 
     def _side_by_side(self, design: FloatArray, exact: bool, rows: Rows) -> dict[str, CallOutcome]:
         """Outcomes of all load cases by name, evaluated side by side on threads; empty where that does not pay.
@@ -243,8 +254,9 @@ class Evaluator:
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
         """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors, or why not."""
         method = sensitivity or self.sensitivity
-        if method in self._lacking:
-            return self.otherwise(sensitivity=method).with_errors(alpha, found, sensitivity)
+        other = self._other_of(method, bool(found.gradients))
+        if other is not None:
+            return other.with_errors(alpha, found, sensitivity)
         errors = self._estimator.errors(self.design(alpha), found, sensitivity)
         return found._replace(errors=errors, message=found.message or self._estimator.why)
 
@@ -326,7 +338,10 @@ class Evaluator:
     def _histories(self, design: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         load_case = next(each.load_case for each in self.case.objectives if each.name == objective)
         place = list(self._by_load_case[load_case]).index(objective)
-        status, t, lines = self.driver(load_case).histories(self.computed(design), place)
+        if not self.beyond:
+            return self.otherwise(sensitivity=HISTORIES, integrator=self.integrator)._histories(design, objective)
+        driver = cast("GeneralDriver", self.driver(load_case))
+        status, t, lines = driver.histories(self.computed(design), place)
         return status, t, lines if self._design_map is None else self._design_map.pull_back(lines)
 
     def problem(self, scalarisation: "Scalarisation | None" = None) -> "Problem":

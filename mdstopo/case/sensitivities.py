@@ -1,7 +1,6 @@
 """The methods of differentiation that a case may name: what is declared of each, one record a method.
 
-What a record names differentiates what a driver has found, and stands in `sensitivity.springs_methods` and
-`general.methods`.
+What a record names differentiates what a driver of a general scene has found, and stands in `general.methods`.
 """
 
 from __future__ import annotations
@@ -12,19 +11,19 @@ from typing import NamedTuple
 class SensitivityKind(NamedTuple):
     """What is declared of a method of differentiation: its name, where its code is, and what it can do.
 
-    name: as case files have it; doc: a sentence for the case reference. springs, general: module:function for springs
-    between free bodies and for everything else, called as `by_direct` of the two modules is; empty of a method whose
-    gradients come with the values, from a sweep backwards. by_parameters: whether it differentiates by more than alpha:
-    parameters of laws, points, defined names. of_candidates: whether prices of candidates follow from it. of_histories:
-    whether derivatives at every time do. is_exact: whether its gradients are those of the computed values, to rounding.
-    tells_norms: whether it tells how the direction of a norm's vector changes (`evaluation.Peak.across`). steps: the
-    capability that an integrator needs for it (`case.integrators.IntegratorKind`), empty where all will do.
+    name: as case files have it; doc: a sentence for the case reference. made_by: module:function, called as
+    `general.methods.by_direct` is; empty of a method whose gradients come with the values, from a sweep backwards: the
+    only one that springs between free bodies have in kernels of their own. by_parameters: whether it differentiates by
+    more than alpha: parameters of laws, points, defined names. of_candidates: whether prices of candidates follow from
+    it. of_histories: whether derivatives at every time do. is_exact: whether its gradients are those of the computed
+    values, to rounding. tells_norms: whether it tells how the direction of a norm's vector changes
+    (`evaluation.Peak.across`). steps: the capability that an integrator needs for it
+    (`case.integrators.IntegratorKind`), empty where all will do.
     """
 
     name: str
     doc: str
-    springs: str = ""
-    general: str = ""
+    made_by: str = ""
     by_parameters: bool = False
     of_candidates: bool = False
     of_histories: bool = False
@@ -35,10 +34,10 @@ class SensitivityKind(NamedTuple):
     @property
     def comes_with_values(self) -> bool:
         """Whether gradients are computed together with the values."""
-        return not self.springs
+        return not self.made_by
 
 
-_SPRINGS, _GENERAL = "mdstopo.sensitivity.springs_methods", "mdstopo.general.methods"
+_HERE = "mdstopo.general.methods"
 
 #: the methods by their name; the first is that of cases that name none
 SENSITIVITIES: dict[str, SensitivityKind] = {
@@ -53,23 +52,20 @@ SENSITIVITIES: dict[str, SensitivityKind] = {
         SensitivityKind(
             "direct",
             "the same, carried forward; its cost grows with the number of members",
-            f"{_SPRINGS}:by_direct",
-            f"{_GENERAL}:by_direct",
+            f"{_HERE}:by_direct",
             by_parameters=True,
             of_histories=True,
         ),
         SensitivityKind(
             "iterative",
             "the same on the steps of generalized_alpha, by fixed-point sweeps",
-            f"{_SPRINGS}:by_iterative",
-            f"{_GENERAL}:by_iterative",
+            f"{_HERE}:by_iterative",
             steps="iterative",
         ),
         SensitivityKind(
             "constant_load",
             "inertia and loads frozen at the peak: an approximation",
-            f"{_SPRINGS}:by_constant_load",
-            f"{_GENERAL}:by_constant_load",
+            f"{_HERE}:by_constant_load",
             is_exact=False,
             tells_norms=False,
         ),

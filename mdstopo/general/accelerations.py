@@ -725,16 +725,18 @@ def accelerations_jvp(model, workspace, k, c, turn, dq, dv, force, row):
       force (n,), row (n_row,): changes of the right side, added to.
     """
     damped = workspace.switches[DAMPED] != 0
+    each = freedoms(model)
     for p in range(model.pair.shape[0]):
         for i in range(pair_freedoms(model)):
             value = 0.0
-            for j in range(pair_freedoms(model)):
-                column = place_in_pair(model, p, j)
-                value += k[p, i, j] * dq[column]
-                if damped:
-                    value += c[p, i, j] * dv[column]
+            for side in range(2):
+                first = place_in_pair(model, p, side * each)
+                for j in range(each):
+                    value += k[p, index(i), index(side * each + j)] * dq[index(first + j)]
+                    if damped:
+                        value += c[p, index(i), index(side * each + j)] * dv[index(first + j)]
             force[place_in_pair(model, p, i)] -= value
-    for d in range(dq.shape[0]):
+    for d in range(dq.shape[0] if workspace.switches[TURNING] != 0 else 0):
         for r in range(rotations(model)):
             force[d] += turn[d, r] * dq[place_of_turn(model, d, r)]
         for r in range(rotations(model), load_slopes(model)):

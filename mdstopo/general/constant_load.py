@@ -2,7 +2,8 @@
 
     [K Phi_q^T; Phi_q 0] (dq, dlam)/dalpha_i = -(B_i^T f_i, 0),     dG/dalpha_i = dg/dalpha_i - f_i (b_i . T z)
 
-with z from the transposed system and (g_q, g_lam). Free bodies make it singular: least squares of least norm.
+with z from the transposed system and (g_q, g_lam). K and f_i are those at rest, so dampers and inerters have no part in
+them. Free bodies make the system singular: least squares of least norm.
 """
 
 import numpy as np
@@ -72,6 +73,7 @@ def hold(
     lam = np.empty(n_row)
     row_bar = np.empty(n_row)
     bars = np.empty((3, n))
+    rest = np.zeros(n)
     k = int(row[STEP])
     c = row[FRACTION]
     who = int(row[WHO])
@@ -89,12 +91,12 @@ def hold(
         padded[:] = 0.0
         slopes = design_slopes(model, member_state, segment, j, who, t, q, v, a, lam, workspace)
         weight = energy_weight(model, j, slopes)
-        add_design(model, segment, t, member_state, q, v, a, z, weight, padded, work)
+        add_design(model, segment, t, member_state, q, rest, rest, z, weight, padded, work)
         sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
         explicit_part(model, segment, j, who, slopes, t, member_state, q, v, a, sign, padded)
         unscale_general(model.block, model.power, alpha, padded, out)
         return
-    general_forces(model, member_state, segment, t, q, v, np.bool_(True), workspace)
+    general_forces(model, member_state, segment, t, q, rest, np.bool_(True), workspace)
     joint_slopes(model, q, v, a, lam, workspace)
     matrix[:] = 0.0
     for d in range(n):

@@ -12,6 +12,7 @@ integrator carries from step to step, of the F free freedoms), and one for an in
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.vector import lanes
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
 from mdstopo.general.balance_slopes import balance_slope, begin_velocities
@@ -43,7 +44,6 @@ from mdstopo.general.step_map import (
 )
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.laws.law_table import FREE_LENGTH
-from mdstopo.sensitivity.propagation import STRIP
 
 
 @kernel
@@ -60,7 +60,7 @@ def through_step(model, member_state, history, w, step, sets_bar, fresh, states,
       member_state (3, columns): state of the members; modes and sets become those of the step.
       states (W + 1, M_padded + P): the derivatives; the last row is left alone where there is no integral.
     Out:
-      fresh (W + 1, STRIP): scratch.
+      fresh (2 W + 4, lanes): scratch.
       work (WORK,): counts of work, added to.
     """
     width = step.by_state.shape[0]
@@ -264,7 +264,7 @@ def push(
     slots = count_sets(model)
     step = make_step_map(model, carried(tag), slots + model.varied.shape[0] + model.apart.shape[0] == 0)
     states = np.zeros((step.end.shape[0], padded.shape[1]))
-    fresh = np.empty((step.end.shape[0], STRIP))
+    fresh = np.empty((2 * step.end.shape[0] + 2, lanes()))
     sets = np.zeros((slots, padded.shape[1]))
     stages = history.index[count, FIRST] if integral > 0 else 0
     bars = np.zeros((stages, 3, n))
@@ -546,7 +546,7 @@ def follow(
     by_poses = slots + model.varied.shape[0] + model.apart.shape[0] + numbers == 0
     step = make_step_map(model, carried(tag), by_poses)
     states = np.zeros((step.end.shape[0], padded.shape[0]))
-    fresh = np.empty((step.end.shape[0], STRIP))
+    fresh = np.empty((2 * step.end.shape[0] + 2, lanes()))
     sets = np.zeros((slots, padded.shape[0]))
     bars = np.zeros((3, n))
     bar_set = np.zeros(slots)

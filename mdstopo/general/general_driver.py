@@ -676,11 +676,15 @@ class GeneralDriver:
     def response_history(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
         """(n_resp, T): every response of a design at times (T,), which its motion reaches."""
         _, count, _ = self.run(alpha, False)
-        t = self.states()[0][: count + 1]
-        step = np.clip(np.searchsorted(t, times, side="right") - 1, 0, count - 1)
-        places = np.stack([step.astype(np.float64), (times - t[step]) / (t[step + 1] - t[step])], axis=1)
+        places = self.places_at(times, count)
         responses = range(len(self.scene.responses))
         return np.array([self.sample_response(j, places, True, count)[2][:, 0] for j in responses])
+
+    def places_at(self, times: FloatArray, count: int) -> FloatArray:
+        """(T, 2): in which of the last run's steps, `count`, times (T,) are, and at what fraction of it."""
+        t = self.states()[0][: count + 1]
+        step = np.clip(np.searchsorted(t, times, side="right") - 1, 0, count - 1)
+        return np.stack([step.astype(np.float64), (times - t[step]) / (t[step + 1] - t[step])], axis=1)
 
     @property
     def model_of_run(self) -> GeneralModel:

@@ -14,11 +14,13 @@ from mdstopo.general.method_interface import implement
 from mdstopo.general.projection import project_back, project_forward
 from mdstopo.general.step_history import FIRST, copy_vector
 from mdstopo.general.step_linear import (
+    find_sweep,
     keep_free,
     prepare_stage_back,
     prepare_stage_forward,
     stage_back,
     stage_forward,
+    sweep,
 )
 from mdstopo.integrators.springs_generalized_alpha import weights_of as alpha_weights
 from mdstopo.integrators.steps import REVERSE
@@ -224,6 +226,9 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
     weights = alpha_weights(tables[0])
     e1, _, _, beta, gamma, _ = weights
     shift = np.empty(n)
+    unknowns = n + rows.shape[2] if sweeps > 0 else 0
+    by_change = np.empty((unknowns, n))
+    room = np.empty((2, unknowns))
     settled = True
     for j in range(last + 1):
         w_q = h * h * beta * e1 if j == last else 0.0
@@ -231,6 +236,9 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
         if j == last:
             shift_tangents(model, history.q[w], history.stage_q[o + j], workspace.tangents[OF_STEP])
         k, c_stage = prepare_stage_forward(model, history, o + j, w_q, w_v, sweeps, workspace)
+        sweeping = sweeps > 0 and j == last
+        if sweeping:
+            find_sweep(model, history, o + j, k, c_stage, w_q, w_v, workspace, by_change)
         for m in range(count):
             _reach_of_stage(
                 model, history, w, o, j, last, h, weights, dq[m], dv[m], dx[m], force[m, j], changes[m, j], shift
@@ -239,10 +247,9 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
             x = changes[m, j, 0]
             u = changes[m, j, 1]
             f = changes[m, j, 2]
-            settled = (
-                stage_forward(model, history, o + j, k, c_stage, w_q, w_v, sweeps, workspace, x, u, f, rows[m, j])
-                and settled
-            )
+            stage_forward(model, history, o + j, k, c_stage, workspace, x, u, f, rows[m, j])
+            if sweeping:
+                settled = sweep(by_change, sweeps, room, f, rows[m, j]) and settled
             if j == last:
                 add_shift(model, workspace.tangents[OF_STEP], w_q, f, x)
                 for d in range(n):

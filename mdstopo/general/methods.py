@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mdstopo.case.integrators import having
 from mdstopo.case.over_time import ReductionKind
 from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.general.extremes import RATE, SIGN, parts, row_of
@@ -13,15 +14,18 @@ from mdstopo.general.row_gradients import BLOCK, Block, sign_of, wanted_rows
 from mdstopo.integrators.scene_driver import ResponseResult
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.springs_model import FloatArray
-from mdstopo.sensitivity.springs_constant_load import DROPPED
-from mdstopo.sensitivity.springs_methods import FALLBACK
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
 
-#: sweeps of the iterative method before it counts as not contracting
+#: sweeps of the iterative method before it counts as not contracting, and what is said then
 SWEEPS = 200
+FALLBACK = "the sweeps of the iterative method do not contract at t = {:.6g} s; direct was taken instead"
+#: times at which constant_load forms a mean or an integral over time
+NODES = 201
+#: singular values below this times the largest are dropped by constant_load
+DROPPED = 1e-10
 
 
 def differentiate(
@@ -30,9 +34,13 @@ def differentiate(
     """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by a method whose gradients do not come
     with the values; and what the user should know although it worked.
 
-    across (n_resp, R, N): is filled, where the method tells that (`evaluation.Peak.across`).
+    across (n_resp, R, N): is filled, where the method tells that (`evaluation.Peak.across`). Raises ValueError for a
+    method that is not defined on the integrator's steps.
     """
-    found: tuple[FloatArray, str] = resolve_name(SENSITIVITIES[method].general)(driver, alpha, result, across)
+    needed = SENSITIVITIES[method].steps
+    if needed and not getattr(driver.method.kind, needed):
+        raise ValueError(f"the {method} method is defined on the steps of {', '.join(having(needed))}")
+    found: tuple[FloatArray, str] = resolve_name(SENSITIVITIES[method].made_by)(driver, alpha, result, across)
     return found
 
 
@@ -152,25 +160,25 @@ def _add_since_settled(
 
 
 def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: ReductionKind, count: int) -> FloatArray:
-    """A row's gradient (N,) by constant dynamic loading; an integral's at the steps' ends, by the trapezoidal rule."""
-    t = driver.states()[0][: count + 1].copy()
+    """A row's gradient (N,) by constant dynamic loading; an integral's at `NODES` times, by the trapezoidal rule."""
     if not reduction.is_integral:
         sign = row[SIGN] if reduction.is_magnitude else 1.0
         gradient = np.zeros(len(driver._alpha))
         for share, part in parts(row):
             gradient += sign * share * _held_at(driver, j, part, count)
         return gradient
+    t = driver.states()[0][: count + 1].copy()
+    times = np.linspace(t[0], t[-1], NODES)
+    weights = np.full(NODES, (t[-1] - t[0]) / (NODES - 1))
+    weights[[0, -1]] *= 0.5
     total = np.zeros(len(driver._alpha))
-    values = np.zeros(count + 1)
-    for k in range(count + 1):
-        place = np.array([[min(k, count - 1), float(k == count)]])
-        seen = driver.sample_response(j, place, True, count)[2][0]
-        weight = 0.5 * (t[min(k + 1, count)] - t[max(k - 1, 0)])
-        at = row_of(t[k], seen[0], place[0, 0], place[0, 1], seen[1], 1.0, seen[2])
-        factor = 2.0 * seen[0] if reduction.is_squared else 1.0
-        values[k] = weight * (seen[0] ** 2 if reduction.is_squared else seen[0])
-        total += weight * factor * _held_at(driver, j, at, count)
-    total *= value_of_integral(reduction, float(values.sum()), float(t[-1] - t[0]))[1]
+    integral = 0.0
+    for time, weight, place in zip(times, weights, driver.places_at(times, count), strict=True):
+        value, rate, who = driver.evaluate_one(j, count, place).tolist()
+        at = row_of(time, value, place[0], place[1], rate, 1.0, who)
+        total += weight * (2.0 * value if reduction.is_squared else 1.0) * _held_at(driver, j, at, count)
+        integral += weight * (value**2 if reduction.is_squared else value)
+    total *= value_of_integral(reduction, integral, float(t[-1] - t[0]))[1]
     for factor, at in driver.jumps.get(j, []):
         total += factor * _held_at(driver, j, at, count)
     return total
@@ -198,7 +206,8 @@ def _held_at(driver: "GeneralDriver", j: int, row: FloatArray, count: int) -> Fl
     call("hold for the system", none)
     moving = np.concatenate([np.flatnonzero(model.free), np.arange(n, size)])
     found = np.zeros(size)
-    found[moving] = np.linalg.pinv(matrix[np.ix_(moving, moving)], rcond=DROPPED).T @ right[moving]
+    # least squares of least norm: free bodies make it singular
+    found[moving] = np.linalg.lstsq(matrix[np.ix_(moving, moving)].T, right[moving], rcond=DROPPED)[0]
     z[:] = found[:n]
     call("hold for the gradient", z)
     out = out.copy()

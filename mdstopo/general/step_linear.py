@@ -3,6 +3,7 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.places import index
 from mdstopo.general.accelerations import (
     NO_SHIFT,
     OF_STEP,
@@ -247,20 +248,20 @@ def changes_forward(tag, model, tables, history, w, dq, dv, force, stage_changes
     h = history.t[w + 1] - history.t[w]
     q = history.stage_q[o : o + s]
     v = history.stage_v[o : o + s]
-    unmoved = np.empty(count, np.bool_)  # where nothing has changed up to the stage in hand
+    first = np.empty(count, np.int64)  # the first stage that changes; -1: the start does
     for m in range(count):
-        unmoved[m] = is_zero(dq[m]) and is_zero(dv[m])
+        first[m] = 0 if is_zero(dq[m]) and is_zero(dv[m]) else -1
     for i in range(s):
         w_q, w_v = own_weights(tag, table, i, h)
         k, c = prepare_stage_forward(model, history, o + i, w_q, w_v, 0, workspace)
         for m in range(count):
-            unmoved[m] = unmoved[m] and is_zero(force[m, i])
-            if unmoved[m]:
+            if first[m] == i and is_zero(force[m, i]):
                 stage_changes[m, i] = 0.0
                 row_changes[m, i] = 0.0
+                first[m] += 1
                 continue
             _runge_kutta_stage_forward(
-                tag, model, table, history, o, i, h, q, v, k, c, dq[m], dv[m], force[m, i], stage_changes[m],
+                tag, model, table, history, o, first[m], i, h, q, v, k, c, dq[m], dv[m], force[m, i], stage_changes[m],
                 row_changes[m, i], workspace,
             )  # fmt: skip
     for m in range(count):
@@ -273,7 +274,7 @@ def changes_forward(tag, model, tables, history, w, dq, dv, force, stage_changes
 
 @part
 def _runge_kutta_stage_forward(
-    tag, model, table, history, o, i, h, q, v, k, c, dq, dv, force, changes, row, workspace
+    tag, model, table, history, o, first, i, h, q, v, k, c, dq, dv, force, changes, row, workspace
 ):  # fmt: skip
     """One stage of `changes_forward`, which is prepared, for one of the R changes.
 
@@ -284,6 +285,7 @@ def _runge_kutta_stage_forward(
       history: the history of steps (`StepHistory`).
     In:
       o, i: number of the step's first stage, and of this one counted from it.
+      first: the first stage that changes, or -1.
       h: length of the step (s).
       q (s, n_q), v (s, n): coordinates and velocities of its stages.
       k, c (n_pair, 2 D, 2 D): of `prepare_stage_forward`.
@@ -294,14 +296,14 @@ def _runge_kutta_stage_forward(
       row (n_row,): changes of the multipliers.
     """
     x = changes[i]
-    stage_jvp(model, table, h, i, q, v, dq, dv, changes)
+    stage_jvp(model, table, h, max(first, 0), i, q, v, dq, dv, changes)
     keep_free(model, x[0])
     keep_free(model, x[1])
     for d in range(force.shape[0]):
         x[2, d] = force[d]
     row[:] = 0.0
     w_q, w_v = own_weights(tag, table, i, h)
-    stage_forward(model, history, o + i, k, c, w_q, w_v, 0, workspace, x[0], x[1], x[2], row)
+    stage_forward(model, history, o + i, k, c, workspace, x[0], x[1], x[2], row)
     if not is_explicit(tag):
         for d in range(force.shape[0]):
             x[0, d] += w_q * x[2, d]
@@ -344,7 +346,8 @@ def prepare_stage_forward(model, history, o, w_q, w_v, sweeps, workspace):
     model: the compiled scene.
     history: the history of steps (`StepHistory`).
     o: number of the stage.
-    w_q, w_v, sweeps: as of `stage_forward`.
+    w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
+    sweeps: above 0 where the sweeps of the iterative method account for that (`sweep`), 0 where the matrix W does.
     workspace: workspace of a balance, which takes what is prepared.
     """
     k, c = lay_out(model, history, o, workspace)
@@ -358,7 +361,7 @@ def prepare_stage_forward(model, history, o, w_q, w_v, sweeps, workspace):
 
 
 @kernel
-def stage_forward(model, history, o, k, c, w_q, w_v, sweeps, workspace, dq, dv, force, row):
+def stage_forward(model, history, o, k, c, workspace, dq, dv, force, row):
     """Changes of a stage's accelerations and multipliers from those of its state and of the forces on it.
 
     Constant:
@@ -367,78 +370,84 @@ def stage_forward(model, history, o, k, c, w_q, w_v, sweeps, workspace, dq, dv, 
     In:
       o: number of the stage, the one that was prepared last (`prepare_stage_forward`).
       k, c (n_pair, 2 D, 2 D): its K and C.
-      w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
-      sweeps: 0 where the matrix W accounts for that; else so many fixed-point sweeps at most (the iterative method) do,
-        until they change by less than SETTLED.
-      dq, dv (n,): changes of coordinates and velocities, without those by the stage's own accelerations.
+      dq, dv (n,): changes of coordinates and velocities, without those by the stage's own accelerations, for which the
+        matrix W accounts; where it was prepared for sweeps, these do (`sweep`).
     In place:
       force (n,): changes of the forces, then of the accelerations.
       row (n_row,): changes of the right side of the rows, then of the multipliers.
       workspace: workspace of a balance, with what was prepared.
-
-    Returns whether the sweeps have settled; True without any.
     """
     accelerations_jvp(model, workspace, k, c, history.turn[o], dq, dv, force, row)
-    if sweeps > 0 and (w_q != 0.0 or w_v != 0.0):
-        return _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row)
     if has_factors(history):
         solve_joints(
             model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, force, row
         )
     else:
         solve_unknowns(model, workspace, force, row)
-    return True
 
 
 @kernel
-def _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row):
-    """Solve [M Phi_q^T; Phi_q 0] x = rhs - (w_q K + w_v C) x by fixed-point sweeps; G_q, G_v stand below K, C.
+def find_sweep(model, history, o, k, c, w_q, w_v, workspace, by_change):
+    """Find what a sweep of the iterative method makes of changes of an implicit stage's accelerations.
 
     Constant:
       model: the compiled scene.
       history: the history of steps (`StepHistory`).
     In:
-      o: number of the stage, which is prepared (`prepare_stage_forward`).
-      w_q, w_v: weights of the stiffness (s^2) and the damping (s).
-      sweeps: how many at most.
-    In place:
-      workspace: workspace of a balance (`accelerations.Workspace`).
-      force (n,), row (n_row,): the right side, then x.
+      o: number of the stage, which is prepared for sweeps (`prepare_stage_forward`).
+      k, c (n_pair, 2 D, 2 D): its K and C.
+      w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
+    Out:
+      workspace: workspace of a balance, with the stage; the way from shifts to coordinates is read.
+      by_change (n + n_row, n): those of accelerations and multipliers, by changes of each acceleration.
+    """
+    n = by_change.shape[1]
+    unit = np.zeros(n)
+    dq = np.empty(n)
+    dv = np.zeros(n)
+    made = np.empty(by_change.shape[0])
+    for d in range(n):
+        unit[d] = 1.0
+        dv[d] = w_v
+        dq[:] = 0.0
+        made[:] = 0.0
+        add_shift(model, workspace.tangents[OF_STEP], w_q, unit, dq)
+        stage_forward(model, history, o, k, c, workspace, dq, dv, made[:n], made[n:])
+        by_change[:, d] = made
+        unit[d] = 0.0
+        dv[d] = 0.0
+
+
+@kernel
+def sweep(by_change, sweeps, room, force, row):
+    """Solve x = b + S x by fixed-point sweeps, which begin at zero; S is what a sweep makes of accelerations.
+
+    by_change (n + n_row, n): S (`find_sweep`). sweeps: how many at most. room (2, n + n_row): scratch.
+    force (n,), row (n_row,): b, of accelerations and multipliers; then x. In place.
 
     Returns whether the sweeps have settled.
     """
     n = force.shape[0]
-    n_row = row.shape[0]
-    x = np.zeros(n)
-    y = np.zeros(n_row)
-    dq = np.empty(n)
-    dv = np.empty(n)
-    right = force.copy()
-    right_row = row.copy()
+    x = room[0]
+    new = room[1]
+    x[:] = 0.0
     last = np.inf
     for _ in range(sweeps):
-        for d in range(n):
-            dq[d] = 0.0
-            dv[d] = w_v * x[d]
-            force[d] = right[d]
-        add_shift(model, workspace.tangents[OF_STEP], w_q, x, dq)
-        for r in range(n_row):
-            row[r] = right_row[r]
-        accelerations_jvp(model, workspace, history.K[o], history.C[o], history.turn[o], dq, dv, force, row)
-        solve_unknowns(model, workspace, force, row)
         change = 0.0
         size = 0.0
-        for d in range(n):
-            change = max(change, abs(force[d] - x[d]))
-            size = max(size, abs(force[d]))
-            x[d] = force[d]
-        for r in range(n_row):
-            change = max(change, abs(row[r] - y[r]))
-            size = max(size, abs(row[r]))
-            y[r] = row[r]
+        for i in range(new.shape[0]):
+            value = force[index(i)] if i < n else row[index(i - n)]
+            for d in range(n):
+                value += by_change[index(i), index(d)] * x[index(d)]
+            new[index(i)] = value
+            change = max(change, abs(value - x[index(i)]))
+            size = max(size, abs(value))
+        x[:] = new
         if not change < np.inf or change > 1e6 * last:
             return False
         if change <= SETTLED * size:
+            force[:] = x[:n]
+            row[:] = x[n:]
             return True
         last = min(last, change)
     return False

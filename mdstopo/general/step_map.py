@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.places import index
+from mdstopo.compiler.vector import lanes, load, store, zero
 from mdstopo.general.gather import fill_poses
 from mdstopo.general.general_model import CODE, DESIGN, INERTER, PAIR
 from mdstopo.general.method_interface import step_forward
@@ -19,7 +21,6 @@ from mdstopo.general.step_linear import free_places, keep_free
 from mdstopo.general.switches import carriers
 from mdstopo.mechanics.kinematics.kinematics_interface import add_pair_force, freedoms, pose_size
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-from mdstopo.sensitivity.propagation import STRIP, add_three
 
 #: stages of a step at most, as everywhere
 STAGES = 17
@@ -240,30 +241,54 @@ def _end_unit(model, step, m, bars, rows_bar):
 def carry_states(step, count, fresh, states):
     """Multiply derivatives of the state at the start of a step by its map.
 
+    Members go through it by whole vectors. What a vector has at the start is copied first: the rows of 1,024 members
+    or a multiple lie so far apart that most of them share their place in the nearest cache.
+
     step: the map (`StepMap`).
     count: how many numbers of the end are wanted: W, or with the integral W + 1.
-    fresh (W + 1, STRIP): scratch.
+    fresh (2 W + 4, lanes): scratch.
     states (W + 1, M): the derivatives by M variables; in its last row the integral's, to which is added.
     """
     width = step.by_state.shape[0]
-    for lo in range(0, states.shape[1], STRIP):
-        hi = min(lo + STRIP, states.shape[1])
+    columns = states.shape[1]
+    flat = states.reshape(states.size)
+    room = fresh.reshape(fresh.size)
+    vector = lanes()
+    whole = columns - columns % vector
+    for i in range(0, whole, vector):
+        for b in range(width):
+            store(room, vector * b, load(flat, b * columns + i))
+        for d in range(0, count, 4):
+            two, three, four = min(d + 1, width), min(d + 2, width), min(d + 3, width)
+            first = zero()
+            second = zero()
+            third = zero()
+            fourth = zero()
+            for b in range(width):
+                x = load(room, vector * b)
+                first += x * step.by_state[index(b), index(d)]
+                second += x * step.by_state[index(b), index(two)]
+                third += x * step.by_state[index(b), index(three)]
+                fourth += x * step.by_state[index(b), index(four)]
+            store(room, vector * (width + d), first)
+            store(room, vector * (width + d + 1), second)
+            store(room, vector * (width + d + 2), third)
+            store(room, vector * (width + d + 3), fourth)
+        for d in range(width):
+            store(flat, d * columns + i, load(room, vector * (width + d)))
+        if count > width:
+            at = width * columns + i
+            store(flat, at, load(flat, at) + load(room, 2 * vector * width))
+    for i in range(whole, columns):
         for d in range(count):
-            out = fresh[d, : hi - lo]
-            if d < width:
-                out[:] = 0.0
-            else:
-                out[:] = states[d, lo:hi]
-            for b in range(0, width, 3):
-                two, three = min(b + 1, width - 1), min(b + 2, width - 1)
-                x = step.by_state[b, d]
-                y = step.by_state[two, d] if b + 1 < width else 0.0
-                z = step.by_state[three, d] if b + 2 < width else 0.0
-                if x != 0.0 or y != 0.0 or z != 0.0:
-                    add_three(x, y, z, states[b, lo:hi], states[two, lo:hi], states[three, lo:hi], out)
-        for d in range(count):
-            for i in range(hi - lo):
-                states[d, lo + i] = fresh[d, i]
+            value = 0.0
+            for b in range(width):
+                value += step.by_state[b, d] * states[b, i]
+            fresh[d, 0] = value
+        for d in range(width):
+            states[d, i] = fresh[d, 0]
+        if count > width:
+            states[width, i] += fresh[width, 0]
 
 
 @kernel

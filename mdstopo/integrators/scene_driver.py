@@ -155,12 +155,6 @@ class SceneDriver(Protocol):
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate a design and evaluate all responses, and on demand their gradients by the discrete adjoint."""
 
-    def differentiate(self, method: str, alpha: FloatArray, result: ResponseResult, cones: bool) -> Differentiated:
-        """Gradients of what `evaluate` found, by a method that is no part of it; cones: tell `across`, too."""
-
-    def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
-        """Times (T,) of the steps and the derivative (T, N) of response j at them, by `direct`."""
-
     def simulate(self, alpha: FloatArray) -> tuple[Status, Steps]:
         """Simulate a design; the steps come back in arrays of their own."""
 

@@ -1,4 +1,4 @@
-"""Gauss collocation, linearised: dense output, the reverse step, the tangent step (`steps_interface`).
+"""Gauss collocation, linearised: dense output, the reverse step (`steps_interface`).
 
 All three work on the stages that `gauss.simulate` kept. Reverse and tangent steps solve the same linear balance of a
 window, transposed or not, by sweeps that contract as the forward ones did.
@@ -10,22 +10,15 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.rows import (
     combine_rows,
     copy_row,
-    integrate_to_nodes,
-    largest_difference,
     make_rows,
     renew_rows,
     row_width,
-    scale_rows,
     take_rows,
 )
 from mdstopo.integrators.springs_gauss import COUNTS, TAG, GaussSteps
 from mdstopo.integrators.springs_gauss_equations import accelerations_vjp, dense_rows, fill_dense
 from mdstopo.integrators.steps import FIRST, LEVEL, REVERSE, SWEEPS, Q, V
 from mdstopo.integrators.steps_interface import implement
-from mdstopo.mechanics.assembly import (
-    add_turning,
-    subtract_products,
-)
 
 
 @kernel
@@ -189,78 +182,6 @@ def reverse_step(
 
 
 @kernel
-def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """By sweeps of the window's linear equations; see `steps_interface.tangent_step`. Not used: dx."""
-    level = steps.index[w, LEVEL]
-    s = COUNTS[level]
-    n = dq.shape[0]
-    o = steps.index[w, FIRST]
-    h = steps.t[w + 1] - steps.t[w]
-    planes = tables[level]
-    k = steps.K[o : o + s]
-    c = steps.C[o : o + s] if damped else steps.C
-    turn = steps.turn[o : o + s] if turning else steps.turn
-    width = row_width(n)
-    rows = make_rows(6 * s, n).reshape((6, s, width))
-    da = rows[0]
-    dq_row = rows[1]
-    dv_row = rows[2]
-    rhs = rows[3]
-    value = rows[4]
-    none = rows[5]
-    vectors = np.zeros((5, width))
-    inverse = vectors[0]  # of the masses
-    root = vectors[1]
-    start_q = vectors[2]
-    start_v = vectors[3]
-    hdv = vectors[4]
-    copy_row(inv_mass, inverse)
-    for d in range(n):
-        root[d] = 1.0 / np.sqrt(inv_mass[d]) if inv_mass[d] > 0.0 else 0.0
-        start_q[d] = dq[d]
-        start_v[d] = dv[d]
-        hdv[d] = h * dv[d]
-    last = np.inf
-    for _ in range(200):
-        integrate_to_nodes(planes[2], s, s, h * h, start_q, hdv, planes[0, 0], da, dq_row)
-        for i in range(s):
-            for d in range(n):
-                rhs[i, d] = force[i, d]
-        subtract_products(pair, k, dq_row, rhs, s)
-        if turning:
-            add_turning(turn, dq_row, rhs, s)
-        if damped:
-            integrate_to_nodes(planes[1], s, s, h, start_v, none[0], planes[0, 0], da, dv_row)
-            subtract_products(pair, c, dv_row, rhs, s)
-        scale_rows(inverse, rhs, s, value)
-        change = largest_difference(value, da, root, s)
-        size = largest_difference(value, none, root, s)
-        take_rows(value, s, da)
-        if change <= 4e-16 * size or (change >= last and change <= 1e-13 * size):
-            break
-        last = change
-    integrate_to_nodes(planes[2], s, s, h * h, start_q, hdv, planes[0, 0], da, dq_row)
-    for i in range(s):
-        for d in range(n):
-            dq_stage[i, d] = dq_row[i, d]
-    beta_q = np.empty(s)
-    beta_v = np.empty(s)
-    reached = 1.0
-    if c_point >= 0.0:
-        reached = c_point
-        _point_weights(planes[3], s, c_point, beta_q, beta_v)
-    else:
-        for j in range(s):
-            beta_v[j] = planes[0, 1, j]
-            beta_q[j] = planes[0, 2, j]
-    for d in range(n):
-        dq[d] += h * reached * dv[d]
-        for j in range(s):
-            dq[d] += h * h * beta_q[j] * da[j, d]
-            dv[d] += h * beta_v[j] * da[j, d]
-
-
-@kernel
 def steps_of(tag, arrays):
     """The arrays as this method's steps."""
     return GaussSteps(*arrays)
@@ -274,6 +195,5 @@ implement(
     parent_of=parent_of,
     stage_weights=stage_weights,
     reverse_step=reverse_step,
-    tangent_step=tangent_step,
     carried=carried,
 )

@@ -1,4 +1,4 @@
-"""Generalized-alpha, linearised: dense output, the reverse step, the tangent step (`steps_interface`).
+"""Generalized-alpha, linearised: dense output, the reverse step (`steps_interface`).
 
 Between two steps q is the cubic through both ends with their velocities, and v is its derivative, so that a peak of a
 response is a stationary point of the very motion it is read from. What a step takes over from the one before beside
@@ -14,9 +14,7 @@ from mdstopo.integrators.springs_generalized_alpha import TAG, AlphaSteps, effec
 from mdstopo.integrators.steps import ENERGY, ENERGY_RATE, FIRST, REVERSE, STARTS, TIME
 from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
-    add_turning,
     add_turning_transposed,
-    subtract_products,
     subtract_transposed,
 )
 from mdstopo.mechanics.kinematics.planar_steps import hermite
@@ -171,72 +169,6 @@ def reverse_step(
 
 
 @kernel
-def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """By the Newton matrix of the step's end; see `steps_interface.tangent_step`.
-
-    dx (2, n) belongs to the accelerations and the auxiliary ones, and always goes to the end.
-    """
-    n = dq.shape[0]
-    o = steps.index[w, FIRST]
-    last = steps.index[w + 1, FIRST] - 1 - o
-    h = steps.t[w + 1] - steps.t[w]
-    e1, e2, e3, beta, gamma, lag = weights_of(tables[0])
-    half = half_width(pair, inv_mass)
-    band = np.empty((n, 3 * half + 1))
-    pivots = np.empty(n, np.int64)
-    speed = np.empty((1, n))
-    a = np.empty((1, n))
-    da = dx[0]
-    aux = dx[1]
-    effective_matrix(
-        pair, inv_mass, steps.K[o + last], steps.C[o + last] if damped else steps.K[o + last],
-        steps.turn[o + last] if turning else da, h * h * beta * e1, h * gamma * e1, damped, turning,
-        np.bool_(False), half, band, pivots,
-    )  # fmt: skip
-    for j in range(last + 1):
-        x = dq_stage[j]
-        for d in range(n):
-            a[0, d] = force[j, d]
-            if j == last:
-                carry = e2 * da[d] - e3 * aux[d]
-                x[d] = dq[d] + h * (dv[d] + h * ((0.5 - beta) * aux[d] + beta * carry))
-                speed[0, d] = dv[d] + h * ((1.0 - gamma) * aux[d] + gamma * carry)
-            elif j == 0:
-                x[d] = dq[d]
-                speed[0, d] = dv[d]
-            else:
-                x[d] = dq[d] + lag * h * (dv[d] + 0.5 * lag * h * da[d])
-                speed[0, d] = dv[d] + lag * h * da[d]
-        stage_x = dq_stage[j : j + 1]
-        subtract_products(pair, steps.K[o + j : o + j + 1], stage_x, a, 1)
-        if turning:
-            add_turning(steps.turn[o + j : o + j + 1], stage_x, a, 1)
-        if damped:
-            subtract_products(pair, steps.C[o + j : o + j + 1], speed, a, 1)
-        for d in range(n):
-            a[0, d] *= inv_mass[d]
-        if j == last:
-            solve(band, half, pivots, a[0])
-        for d in range(n):
-            if j == last:
-                x[d] += h * h * beta * e1 * a[0, d]
-                speed[0, d] += h * gamma * e1 * a[0, d]
-                aux[d] = e1 * a[0, d] + e2 * da[d] - e3 * aux[d]
-                da[d] = a[0, d]
-            elif j == 0:
-                da[d] = a[0, d]
-                aux[d] = a[0, d]
-            else:
-                aux[d] = 2.0 * da[d] - a[0, d]
-    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c_point if c_point >= 0.0 else 1.0)
-    for d in range(n):
-        start = dq[d]
-        end = dq_stage[last, d]
-        dq[d] = q0 * start + q1 * end + h * (v0 * dv[d] + v1 * speed[0, d])
-        dv[d] = (dq0 * start + dq1 * end) / h + dv0 * dv[d] + dv1 * speed[0, d]
-
-
-@kernel
 def steps_of(tag, arrays):
     """The arrays as this method's steps."""
     return AlphaSteps(*arrays)
@@ -251,6 +183,5 @@ implement(
     parent_of=parent_of,
     stage_weights=stage_weights,
     reverse_step=reverse_step,
-    tangent_step=tangent_step,
     carried=carried,
 )

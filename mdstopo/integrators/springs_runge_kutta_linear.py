@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta methods: partial steps, the reverse step, the tangent step (`steps_interface`)."""
+"""Explicit Runge-Kutta methods: partial steps, the reverse step (`steps_interface`)."""
 
 import numpy as np
 
@@ -8,9 +8,7 @@ from mdstopo.integrators.springs_runge_kutta import MOST, TAG, RungeKuttaSteps, 
 from mdstopo.integrators.steps import ENERGY, ENERGY_RATE, FIRST, PARENT, REVERSE, SEGMENT, TIME
 from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
-    add_turning,
     add_turning_transposed,
-    subtract_products,
     subtract_transposed,
 )
 from mdstopo.mechanics.kinematics.planar_poses import POSE
@@ -177,44 +175,6 @@ def reverse_step(
 
 
 @kernel
-def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Stage after stage; see `steps_interface.tangent_step`.
-
-    Not used: c_point (a point inside a step is a partial step's end), dx.
-    """
-    n = dq.shape[0]
-    o = steps.index[w, FIRST]
-    s = steps.index[w + 1, FIRST] - o
-    table = tables[1 if damped else 0]
-    h = steps.t[w + 1] - steps.t[w]
-    one = np.int64(1)
-    da = np.empty((s, n))
-    dv_stage = np.empty((s, n))
-    for i in range(s):
-        for d in range(n):
-            position = dq[d] + h * table[2, 0, i] * dv[d]
-            speed = dv[d]
-            for j in range(i):
-                position += h * h * table[0, i, j] * da[j, d]
-                speed += h * table[1, i, j] * da[j, d]
-            dq_stage[i, d] = position
-            dv_stage[i, d] = speed
-            da[i, d] = force[i, d]
-        subtract_products(pair, steps.K[o + i :], dq_stage[i:], da[i:], one)
-        if turning:
-            add_turning(steps.turn[o + i :], dq_stage[i:], da[i:], one)
-        if damped:
-            subtract_products(pair, steps.C[o + i :], dv_stage[i:], da[i:], one)
-        for d in range(n):
-            da[i, d] *= inv_mass[d]
-    for d in range(n):
-        dq[d] += h * dv[d]
-        for j in range(s):
-            dq[d] += h * h * table[2, 1, j] * da[j, d]
-            dv[d] += h * table[2, 2, j] * da[j, d]
-
-
-@kernel
 def steps_of(tag, arrays):
     """The arrays as this method's steps."""
     return RungeKuttaSteps(*arrays)
@@ -230,6 +190,5 @@ implement(
     parent_of=parent_of,
     stage_weights=stage_weights,
     reverse_step=reverse_step,
-    tangent_step=tangent_step,
     carried=carried,
 )

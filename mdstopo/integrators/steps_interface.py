@@ -11,11 +11,10 @@ An integrator is a NamedTuple of steps and these compiled functions; `implement`
 3. `parent_of`: the step before a step.
 4. `stage_weights`: weights of the stages in the integral over a step.
 5. `reverse_step`: a step of the reverse sweep.
-6. `tangent_step`: changes carried forward through a step.
-7. `carried`: how much else the method carries from step to step; nothing for one-step methods.
-8. `steps_of`: the steps' tuple from the arrays of `steps.carve`, because what Python hands over are flat arrays. The
+6. `carried`: how much else the method carries from step to step; nothing for one-step methods.
+7. `steps_of`: the steps' tuple from the arrays of `steps.carve`, because what Python hands over are flat arrays. The
    tag is a tuple of zeros; its length, which is part of its type, says which method is meant.
-9. `sample`: energies and their rates along the motion, without its first and last state. May be left out where the
+8. `sample`: energies and their rates along the motion, without its first and last state. May be left out where the
    stages are ordered and exact.
 """
 
@@ -131,30 +130,8 @@ def reverse_step(
     raise NotImplementedError
 
 
-def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Carry changes of the state forward through a step: its linearisation.
-
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables: constant arrays of the method.
-      steps: what the integrator kept.
-      w: number of the step.
-      c_point: fraction of the step up to which; negative: to its end.
-      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-    In and out:
-      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
-      dx (n_carried, n): the same of what else the method carries from step to step.
-    Out:
-      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
-    """
-    raise NotImplementedError
-
-
 def carried(steps):
-    """How many rows lam_x and dx have: none for one-step methods."""
+    """How many rows lam_x has: none for one-step methods."""
     raise NotImplementedError
 
 
@@ -207,6 +184,6 @@ def sample_stages(steps, count, damped, t, g, d):
     return m
 
 
-for _stub in (point_of, reach, sample, parent_of, stage_weights, reverse_step, tangent_step, carried):
+for _stub in (point_of, reach, sample, parent_of, stage_weights, reverse_step, carried):
     by_type(_stub, "steps", partial(_implementation, _stub.__name__))
 by_type(steps_of, "tag", lambda tag: _MAKERS[len(tag)])

@@ -377,15 +377,6 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):
     shared(_design_chunks, threads_for(model, count + energies), job)
 
 
-@part
-def energy_gradient(model, point, weight, out):
-    """Add the explicit part of the energy's design gradient alone: out (M_padded,) += sum_e weight_e V_i(q_e)."""
-    n = model.q0.shape[0]
-    pose = np.empty((0, model.pair.shape[0], POSE))
-    none = np.empty(0, np.int64)
-    design_gradient(model, point, pose, np.empty((0, n)), none, point, weight, out, np.zeros(8, np.int64))
-
-
 @kernel
 def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):
     """Add to the design gradient of chunk after chunk, until none is left: what each thread does.

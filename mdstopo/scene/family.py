@@ -5,6 +5,7 @@ from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
 from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.responses import kind_of
+from mdstopo.case.sensitivities import chosen
 from mdstopo.scene.signal_segments import formulas_of
 
 
@@ -16,6 +17,8 @@ def beyond_springs(case: Case) -> str:
         return "joints"
     if case.solver.settle:
         return "static settling"
+    if not chosen(case.solver.sensitivity).comes_with_values:
+        return f"the sensitivity method {case.solver.sensitivity}"
     kind = INTEGRATORS.get(case.solver.integrator)
     if kind is not None and kind.general and not kind.springs:
         return f"the integrator {kind.name}"

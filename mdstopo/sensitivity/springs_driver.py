@@ -10,7 +10,7 @@ import numpy as np
 from mdstopo.case.model import Case, MemberGroup
 from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.integrators.driver import Driver
-from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult
+from mdstopo.integrators.scene_driver import DriverOptions
 from mdstopo.scene.compile_scene import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.diagnosis import Diagnosis
 from mdstopo.scene.settled import Settled
@@ -33,18 +33,6 @@ class SpringsDriver(Driver):
         super().__init__(scene, options, _response_entries, reductions, integrated)
         self.case = case
         self._diagnosis = Diagnosis(case, scene)
-
-    def differentiate(self, method: str, alpha: FloatArray, result: ResponseResult, cones: bool) -> Differentiated:
-        """Gradients of what `evaluate` found; energies are no norms, so `cones` changes nothing."""
-        from mdstopo.sensitivity.springs_methods import differentiate
-
-        return differentiate(method, self, alpha, result)
-
-    def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
-        """Times (T,) of the steps and the derivative (T, N) of the stored energy at them, by `direct`."""
-        from mdstopo.sensitivity.springs_methods import histories
-
-        return histories(self, alpha)
 
     def response_history(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
         """(n_resp, T): the stored energy of a design at times (T,), for each objective that is of it."""

@@ -31,7 +31,7 @@ def test_general_kernels_have_the_gradients_of_those_of_springs(units, integrato
     else:
         case = replace(case, solver=replace(case.solver, tolerance=1e-11))
     springs, general = (Evaluator(case, beyond=beyond) for beyond in ("", "a comparison"))
-    own, found = (each.evaluate(case.initial, sensitivity="direct") for each in (springs, general))
+    own, found = springs.evaluate(case.initial), general.evaluate(case.initial, sensitivity="direct")
     assert springs.beyond == ""
     peak = general.with_objectives(["G"]).evaluate(case.initial, sensitivity="direct")
     assert peak.work["design_states"] > peak.work["steps"]  # those of every step, not of the peak alone

@@ -198,29 +198,6 @@ class Bench:
     def gradient(self):
         return self.gradients[0, 0]
 
-    def direct(self, history=False):
-        """Gradients (n_obj, R, N) by `direct`; with history also dg/dalpha at the steps' ends (count + 1, N)."""
-        from mdstopo.sensitivity.springs_direct import direct
-
-        out = np.zeros_like(self.gradients)
-        lines = np.zeros((self.count + 1 if history else 0, self.scene.n_design))
-        direct(
-            self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, self.limits, self.count,
-            self.reductions, self.room, self.room_ints, self.strength, self.rows, self.found, out, lines, self.work,
-        )  # fmt: skip
-        return (out, lines) if history else out
-
-    def iterative(self):
-        """Gradients by `iterative`, and the step at which it gave up, or -1."""
-        from mdstopo.sensitivity.springs_iterative import iterative
-
-        out = np.zeros_like(self.gradients)
-        step = iterative(
-            self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, self.limits, self.count,
-            self.reductions, self.room, self.room_ints, self.strength, self.rows, self.found, out, self.work,
-        )  # fmt: skip
-        return out, step
-
     def at(self, times):
         """q, v, a (3, T, n) of the dense output."""
         times = np.atleast_1d(np.asarray(times, dtype=float))

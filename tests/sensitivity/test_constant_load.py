@@ -1,78 +1,68 @@
 """Constant dynamic loading, against equilibria found again after each change of a member."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from mdstopo.scene.packing import pack
-from mdstopo.sensitivity.springs_constant_load import constant_load
-from tests.integrators.scenes import Group, energies, random_scene
+from mdstopo import evaluate, simulate
+from tests.engine.plain import Plain
+from tests.engine.scenes import random_design, random_scene, read
+
+FEATURES = "damping", "ground", "preload", "follower", "power", "spin"
 
 
-def internal_force(scene, alpha, q):
-    """-dU/dq (n,) of all members, U their energy with preload, by a complex-free high-order difference."""
-
-    def potential(q):
-        unit, power = energies(scene, q)
-        return np.sum(alpha**power * unit)
-
-    out = np.zeros_like(q)
-    for d in range(len(q)):
-        h = 1e-3
-        e = np.zeros_like(q)
-        e[d] = h
-        pieces = [potential(q + k * e) - potential(q - k * e) for k in (1, 2, 3)]
-        out[d] = -(45 * pieces[0] - 9 * pieces[1] + pieces[2]) / (60 * h)
-    return out
+def scene_of(*features, over_time="final", **changes):
+    scene = random_scene(12, *features, over_time=over_time) | changes
+    case = read(scene, integrator="runge_kutta", step=0.02)
+    return case, random_design(case, 12, low=0.4)
 
 
-@pytest.fixture
-def held():
-    scene = random_scene([Group(0, 2, 20), Group(1, 0, 15, power=3.0)], [(3, 0.5), (5, 1.0)], ground=True)
-    rng = np.random.default_rng(4)
-    pose = scene.model.q0 + 0.05 * rng.standard_normal(9) * (scene.model.inv_mass > 0)
-    return scene, rng.uniform(0.4, 1.0, 35), pose
-
-
-def test_it_is_the_derivative_of_the_equilibrium_under_the_forces_held_fixed(held):
-    scene, alpha, pose = held
-    load = -internal_force(scene, alpha, pose)
-    moving = np.flatnonzero(scene.model.inv_mass > 0)
+def test_it_is_the_derivative_of_the_equilibrium_under_the_forces_held_fixed():
+    case, alpha = scene_of(*FEATURES)
+    pose = simulate(case, alpha).q[-1]
+    load = -Plain(case, alpha).member_force(pose, np.zeros_like(pose))
 
     def value(design):
-        q = pose.copy()
-        for _ in range(8):
-            residual = (internal_force(scene, design, q) + load)[moving]
-            jacobian = np.zeros((len(moving), len(moving)))
-            for column, d in enumerate(moving):
-                e = np.zeros(9)
-                e[d] = 1e-5
-                ahead, behind = internal_force(scene, design, q + e), internal_force(scene, design, q - e)
-                jacobian[:, column] = (ahead - behind)[moving] / 2e-5
-            q[moving] -= np.linalg.solve(jacobian, residual)
-        unit, power = energies(scene, q)
-        return np.sum(design**power * unit)
+        plain, q = Plain(case, design), pose.copy()
 
-    gradient = constant_load(pack(scene.model), alpha, pose[None], np.ones(1))
-    for i in (0, 7, 22, 34):
-        e = np.zeros(35)
-        e[i] = 1e-3
-        assert (value(alpha + e) - value(alpha - e)) / 2e-3 == pytest.approx(gradient[i], rel=1e-4, abs=1e-5)
+        def residual(q):
+            return plain.member_force(q, np.zeros_like(q)) + load
+
+        for _ in range(6):
+            ahead, behind = (
+                np.array([residual(q + sign * 1e-6 * e) for e in np.eye(len(q))]).T for sign in (1.0, -1.0)
+            )
+            q -= np.linalg.solve((ahead - behind) / 2e-6, residual(q))
+        assert np.abs(residual(q)).max() <= 1e-9 * np.abs(load).max()
+        return plain.energy(q)
+
+    gradient = evaluate(case, alpha, method="constant_load").gradients["G"]
+    for i in (0, len(alpha) // 2, len(alpha) - 1):
+        e = 1e-4 * np.eye(len(alpha))[i]
+        slope = (value(alpha + e) - value(alpha - e)) / 2e-4
+        assert gradient[i] == pytest.approx(slope, rel=1e-6, abs=1e-7 * np.abs(gradient).max())
 
 
 def test_rigid_motion_of_free_bodies_takes_no_part():
-    scene = random_scene([Group(0, 1, 20)], [(3, 0.5), (5, 1.0)])
-    pose = scene.model.q0 + np.array([0.0, 0, 0, 0.05, 0.02, 0.1])
-    alpha = np.full(20, 0.5)
-    packed = pack(scene.model)
-    shifted = pose + np.array([0.3, -0.2, 0, 0.3, -0.2, 0])
-    gradient = constant_load(packed, alpha, pose[None], np.ones(1))
-    assert np.abs(gradient).max() > 0.0
-    assert np.allclose(constant_load(packed, alpha, shifted[None], np.ones(1)), gradient, rtol=1e-9)
+    """All bodies fall: what they do beside that is the same, and so is the gradient."""
+    case, alpha = scene_of("spin", gravity=[0.0, 0.0])
+    falling, _ = scene_of("spin", gravity=[3.0, -9.8])
+    held, other = (evaluate(each, alpha, method="constant_load").gradients["G"] for each in (case, falling))
+    assert np.abs(held).max() > 0.0
+    assert np.abs(other - held).max() <= 1e-9 * np.abs(held).max()
 
 
-def test_a_mean_is_the_weighted_sum_of_its_nodes(held):
-    scene, alpha, pose = held
-    packed = pack(scene.model)
-    poses, weights = np.array([pose, scene.model.q0 + 0.01 * (pose != 0)]), np.array([0.3, 0.7])
-    single = [constant_load(packed, alpha, pose[None], np.ones(1)) for pose in poses]
-    assert np.allclose(constant_load(packed, alpha, poses, weights), 0.3 * single[0] + 0.7 * single[1])
+def test_a_mean_is_that_of_gradients_of_final_values():
+    """Of motions that end at the nodes of Gauss's rule."""
+    case, alpha = scene_of(over_time="mean")
+    (load_case,) = case.load_cases
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    mean = np.zeros(len(alpha))
+    for node, weight in zip(nodes, weights, strict=True):
+        end = load_case.start + 0.5 * (1.0 + node) * (load_case.end - load_case.start)
+        shorter = replace(case, load_cases=(replace(load_case, end=end),))
+        shorter = replace(shorter, objectives=(replace(case.objectives[0], over_time="final"),))
+        mean += 0.5 * weight * evaluate(shorter, alpha, method="constant_load").gradients["G"]
+    found = evaluate(case, alpha, method="constant_load").gradients["G"]
+    assert np.abs(found - mean).max() <= 1e-3 * np.abs(mean).max()

@@ -364,13 +364,13 @@ def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
     raise NotImplementedError
 
 
-def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
+def stage_jvp(model, table, h, first, i, q, v, dq, dv, changes):
     """Changes of a stage's coordinates and velocities.
 
     In:
       model: the compiled scene.
       table (3, 17, 17), h: coefficients of the method, and length of the step (s).
-      i: number of the stage.
+      first, i: numbers of the first stage that changes, and of the stage.
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
       dq, dv (n,): changes of the start's.
     In and out:

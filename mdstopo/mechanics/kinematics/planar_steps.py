@@ -8,6 +8,7 @@ and all derivatives of it are its coefficients.
 """
 
 from mdstopo.compiler.jit import part
+from mdstopo.compiler.places import index
 
 #: planes of a method's table (`integrators.runge_kutta_tables`), and rows of its last one
 BY_STAGE, BY_RATE, VECTORS = range(3)
@@ -75,14 +76,14 @@ def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
 
 
 @part
-def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
+def stage_jvp(model, table, h, first, i, q, v, dq, dv, changes):
     """Changes of coordinates and velocities of stage i; see `kinematics_interface.stage_jvp`."""
     for d in range(dq.shape[0]):
         position = dq[d] + h * table[VECTORS, NODES, i] * dv[d]
         speed = dv[d]
-        for j in range(i):
-            position += h * h * table[BY_STAGE, i, j] * changes[j, 2, d]
-            speed += h * table[BY_RATE, i, j] * changes[j, 2, d]
+        for j in range(first, i):
+            position += h * h * table[BY_STAGE, i, index(j)] * changes[index(j), 2, d]
+            speed += h * table[BY_RATE, i, index(j)] * changes[index(j), 2, d]
         changes[i, 0, d] = position
         changes[i, 1, d] = speed
 
@@ -91,10 +92,13 @@ def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
 def end_jvp(model, table, s, h, q, v, changes, dq, dv):
     """Changes of the end of a step; see `kinematics_interface.end_jvp`."""
     for d in range(dq.shape[0]):
-        dq[d] += h * dv[d]
+        position = dq[d] + h * dv[d]
+        speed = dv[d]
         for j in range(s):
-            dq[d] += h * h * table[VECTORS, END, j] * changes[j, 2, d]
-            dv[d] += h * table[VECTORS, END_RATE, j] * changes[j, 2, d]
+            position += h * h * table[VECTORS, END, index(j)] * changes[index(j), 2, d]
+            speed += h * table[VECTORS, END_RATE, index(j)] * changes[index(j), 2, d]
+        dq[d] = position
+        dv[d] = speed
 
 
 @part

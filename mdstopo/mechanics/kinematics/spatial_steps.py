@@ -366,7 +366,7 @@ def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
 
 
 @kernel
-def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
+def stage_jvp(model, table, h, first, i, q, v, dq, dv, changes):
     """Changes of coordinates and velocities of stage i; see `kinematics_interface.stage_jvp`."""
     for body in range(dq.shape[0] // FREEDOMS):
         c = COORDINATES * body
@@ -376,7 +376,7 @@ def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
         velocity = vector_at(dv, d)
         omega = vector_at(dv, d + 3)
         turn = (0.0, 0.0, 0.0)
-        for j in range(i):
+        for j in range(first, i):
             w = h * table[BY_RATE, i, j]
             acceleration = changes[j, 2]
             place = plus(place, times(h * h * table[BY_STAGE, i, j], vector_at(acceleration, d)))
