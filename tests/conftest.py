@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests import tiers, times
+from tests import rewriting, tiers, times
 from tests.entries import hold_calls
 from tests.tiers import mark, without_test
 
@@ -26,6 +26,7 @@ def pytest_configure(config: pytest.Config) -> None:
     tiers.begin(config)
     hold_calls()
     times.begin(config)
+    config.pluginmanager.register(rewriting)
     if hasattr(config, "workerinput"):
         return  # the process that gives the tests out has asked
     asked = [sys.executable, "-P", "-c", _WHERE]

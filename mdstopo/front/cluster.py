@@ -20,6 +20,8 @@ from mdstopo.front.pool import Keep, ignore_both
 from mdstopo.store.store_errors import StoreError
 from mdstopo.workers.worker_pool import PATIENCE, Lost, WorkerError
 
+#: s within which a scheduler has to answer
+ANSWERING = 10.0
 #: engines are for one thread at a time, and a Dask worker may have several
 _one_at_a_time = threading.Lock()
 
@@ -81,7 +83,7 @@ class Cluster:
         if "://" not in address or ":" not in address.split("://")[1]:
             raise StoreError(f"no Dask scheduler answers at {address}: write it as tcp://host:8786")
         try:
-            self._client = Client(address, timeout=10, set_as_default=False)
+            self._client = Client(address, timeout=ANSWERING, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise StoreError(f"no Dask scheduler answers at {address}: {error}") from error
         versions = self._client.run(_version)

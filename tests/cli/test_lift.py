@@ -193,6 +193,7 @@ uncertainty:
   scenarios: {one: {probability: 0.5}, two: {probability: 0.5, set: {members.s.law.stiffness: 700}}}
   sample: 4
 objectives: {G: {response: energy}}
+solver: {integrator: runge_kutta}
 """
 
 

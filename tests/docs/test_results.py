@@ -8,6 +8,8 @@ from pathlib import Path
 import h5py
 import pytest
 
+from mdstopo.cli.group import run_group
+
 from .pages import DOCS, blocks
 from .test_pages import run
 
@@ -98,27 +100,28 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     (folder / "fitted.yaml").write_text(FITTED, encoding="utf-8")
     (folder / "way.csv").write_text("0.02, 0.03\n0.04, 0.07\n0.06, 0.1\n0.08, 0.14\n", encoding="utf-8")
     (folder / "turn.csv").write_text("0, 1\n1, 2\n", encoding="utf-8")
-    for command in (
-        "simulate jointed.yaml",
-        "simulate boat.yaml",
-        "run boat.yaml",
-        "run windy.yaml",
-        "run boat.yaml --alpha results/boat.simulate.h5 --out results/again.h5",
-        "gradient boat.yaml --history --differences --members 2",
-        "pareto boat.yaml --points 3 --starts 1",
-        "run varied.yaml",
-        "run staged.yaml",
-        "run sold.yaml",
-        "run priced.yaml",
-        "sweep set priced.yaml members.ties.law.stiffness=8,9",
-        "gradient varied.yaml --history --differences",
-        "pareto varied.yaml --points 4 --starts 1",
-        "sweep set varied.yaml members.spring.law.stiffness=8,9 optimizer.starts=1",
-        "fit fitted.yaml --profile 1",
-        "sweep set boat.yaml members.belts.law.stiffness=4000,5000 optimizer.max_iterations=1",
-    ):
-        done = run(f"mdstopo {command}", folder)
-        assert done.returncode == 0, done.stdout
+    with pytest.MonkeyPatch.context() as there:
+        there.chdir(folder)
+        for command in (
+            "simulate jointed.yaml",
+            "simulate boat.yaml",
+            "run boat.yaml",
+            "run windy.yaml",
+            "run boat.yaml --alpha results/boat.simulate.h5 --out results/again.h5",
+            "gradient boat.yaml --history --differences --members 2",
+            "pareto boat.yaml --points 3 --starts 1",
+            "run varied.yaml",
+            "run staged.yaml",
+            "run sold.yaml",
+            "run priced.yaml",
+            "sweep set priced.yaml members.ties.law.stiffness=8,9",
+            "gradient varied.yaml --history --differences",
+            "pareto varied.yaml --points 4 --starts 1",
+            "sweep set varied.yaml members.spring.law.stiffness=8,9 optimizer.starts=1",
+            "fit fitted.yaml --profile 1",
+            "sweep set boat.yaml members.belts.law.stiffness=4000,5000 optimizer.max_iterations=1",
+        ):
+            assert run_group([*command.split(), "--quiet"]) == 0, command
     found: set[str] = set()
     for path in sorted(Path(folder, "results").glob("*.h5")):
         with h5py.File(path) as file:

@@ -6,6 +6,7 @@ import logging
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,8 @@ from mdstopo.front.cluster import tell_lost_connections_in_our_words
 from tests.front.support import CASE
 from tests.front.test_fronts import assert_equal, contents
 
-pytest.importorskip("distributed")
+# to be looked for and not imported: only the process that runs these tests needs it
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="distributed is not installed")
 
 #: enough members for a front that takes some seconds
 LARGE = CASE.replace("count: 8}", "count: 40}").replace("count: 3}", "count: 20}").replace("equals: 7.2", "equals: 240")

@@ -16,6 +16,7 @@ import pytest
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
+from mdstopo.front import cluster
 from mdstopo.front.directions import weights_of_first
 from mdstopo.front.run_front import Ask, run_front
 from mdstopo.plan.front_measures import dominated, hypervolume, neighbour_gaps, scaled
@@ -207,7 +208,8 @@ def test_the_command_tells_everything(capsys):
         ("--cluster tcp://127.0.0.1:9", "no Dask scheduler answers"),
     ],
 )
-def test_what_is_no_front_is_refused(words, said, capsys):
+def test_what_is_no_front_is_refused(words, said, capsys, monkeypatch):
+    monkeypatch.setattr(cluster, "ANSWERING", 0.5)
     assert run_group(["pareto", "probe.yaml", *words.split()]) == 2
     assert said in capsys.readouterr().err
 

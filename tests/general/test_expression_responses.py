@@ -134,7 +134,7 @@ def test_in_space_expressions_are_the_same_and_have_the_derivatives_of_differenc
         "least": (expression("min(20*x + 8, y)", x=DX, y=A), "max"),
         "turned": (expression("max(x - 0.4, 0)", x="{tilt: {body: load}}"), "integral"),
     }
-    case = looking(SPACE, objectives, tolerance=1e-10)
+    case = looking(SPACE, objectives, integrator="runge_kutta", tolerance=1e-10)
     design, direction = np.linspace(0.3, 0.9, 4), np.array([1.0, -2.0, 1.5, 0.5])
     found = mdstopo.evaluate(case, design)
     assert found.objectives["norm"] == pytest.approx(found.objectives["built_in"], rel=1e-12)

@@ -163,7 +163,7 @@ objectives:
   Z: {response: {displacement: {body: arm, relative_to: engine, component: z, since: settled}}, over_time: final}
   R: {response: {displacement: {body: arm, relative_to: engine, since: settled}}, over_time: rms}
 combine: {weights: {F: 1, Z: 1, R: 1}}
-solver: {settle: true, tolerance: 1.0e-11}
+solver: {integrator: runge_kutta, settle: true, tolerance: 1.0e-11}
 """
 
 

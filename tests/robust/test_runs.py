@@ -23,6 +23,7 @@ from mdstopo.robust.sample import lattice
 from mdstopo.session.run_session import run_session
 from mdstopo.workers.worker_pool import Lost, WorkerError
 from tests.robust.scenes import PARAMETERS, SCENARIOS, read, scene, text, uncertain
+from tests.tiers import examples
 
 DEVIATION = {"measure": "mean_deviation", "factor": 2}
 
@@ -121,14 +122,15 @@ def test_a_robust_design_is_the_better_one_where_it_counts():
 
 @pytest.fixture(scope="module")
 def tries():
-    """An ensemble, and the values of designs that were not fitted to it at the points of its sample and a fresh one."""
+    """An ensemble, and for designs that were not fitted to it the values at the points of its sample and of a fresh
+    one, and what is told of G."""
     engine = evaluator_of(read(uncertain(DEVIATION, sample=64, validation=256)))
     found = []
-    for seed in range(3):
+    for seed in range(examples(2, 3)):
         alpha = np.random.default_rng(seed).uniform(0.05, 0.6, engine.case.n_design)
-        part = conclude(engine, alpha, engine.evaluate(alpha, gradient=False), None).part
+        concluded = conclude(engine, alpha, engine.evaluate(alpha, gradient=False), None)
         names = ("uncertainty/objectives", "uncertainty/validation/objectives")
-        found.append([np.asarray(part[name])[:, 0] for name in names])
+        found.append((*(np.asarray(concluded.part[name])[:, 0] for name in names), concluded.of("G")))
     return engine, found
 
 
@@ -141,7 +143,7 @@ def test_the_fresh_sample_agrees_within_its_interval_at_designs_that_were_not_fi
     engine, found = tries
     p = engine.sample.probability
     level = Measure("worst", level=64 / 65) if measure.name == "worst" else measure
-    for own, fresh in found:
+    for own, fresh, _ in found:
         check = estimate(level, fresh)
         assert check.low < check.value < check.high
         assert check.holds(statistic(measure, own, p))
@@ -150,10 +152,8 @@ def test_the_fresh_sample_agrees_within_its_interval_at_designs_that_were_not_fi
 
 
 def test_what_is_told_is_the_estimate(tries):
-    engine, found = tries
-    alpha = np.random.default_rng(0).uniform(0.05, 0.6, engine.case.n_design)
-    told = conclude(engine, alpha, engine.evaluate(alpha, gradient=False), None).of("G")
-    assert told.check == estimate(Measure("mean_deviation", factor=2.0), found[0][1])
+    _, fresh, told = tries[1][0]
+    assert told.check == estimate(Measure("mean_deviation", factor=2.0), fresh)
     assert told.agrees
     assert told.measure == "mean and 2 deviations"
 

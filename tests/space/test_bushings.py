@@ -97,8 +97,9 @@ def test_bushings_pull_as_their_potential_and_dampers_say() -> None:
         assert np.abs(motion.a[t] - a.ravel()).max() < 1e-8 * np.abs(a).max()
 
 
-def test_gradients_through_bushings_are_slopes() -> None:
-    case = read_case(CASE)
+@pytest.mark.parametrize("integrator", ["runge_kutta", "gauss"])
+def test_gradients_through_bushings_are_slopes(integrator: str) -> None:
+    case = read_case(CASE, overrides={"solver.integrator": integrator})
     alpha = np.array([0.7, 1.3, 1.1, 0.8]) * case.initial
     found = mdstopo.evaluate(case, alpha)
     assert found.status.ok, found.message

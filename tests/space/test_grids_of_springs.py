@@ -215,10 +215,12 @@ constraints:
   - {volume: net, fraction: 0.3}
 solver: {tolerance: 1.0e-10}
 """
+#: collocation goes through the springs at several poses at once
+INTEGRATORS = ("runge_kutta", "gauss")
 
 
-def evaluated(text: str) -> Evaluation:
-    case = read_case(text)
+def evaluated(text: str, integrator: str = "auto") -> Evaluation:
+    case = read_case(text, overrides={"solver.integrator": integrator})
     return evaluate(case, np.random.default_rng(1).uniform(0.05, 1.0, case.n_design))
 
 
@@ -245,17 +247,20 @@ def test_a_case_has_the_same_values_and_gradients_without_the_kernels_for_grids(
         )
 
 
-def test_a_pass_over_very_many_springs_is_the_same_with_any_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_pass_over_very_many_springs_is_the_same_with_any_number_of_threads(
+    monkeypatch: pytest.MonkeyPatch, integrator: str
+) -> None:
     text = CASE.replace("DAMPING", "free_length: 0.6").replace("count: [5, 4]", "count: [10, 10]")
     text = text.replace("count: 21", "count: 170")  # 17,000 springs
     text = text.replace("{end: 0.4}", "{end: 0.05}").replace("1.0e-10", "1.0e-6")
     found = []
     for threads in ("1", "3"):
         monkeypatch.setenv("MDSTOPO_THREADS", threads)
-        found.append(evaluated(text))
+        found.append(evaluated(text, integrator))
     monkeypatch.setattr(compile_general, "row_of", lambda *arguments, **options: (0, 0))
     monkeypatch.setattr(compile_general, "short_row_of", lambda group: 0)
-    without = evaluated(text)
+    without = evaluated(text, integrator)
     one, three = found
     assert one.objectives == three.objectives
     for name, value in without.objectives.items():
@@ -265,13 +270,14 @@ def test_a_pass_over_very_many_springs_is_the_same_with_any_number_of_threads(mo
         assert one.gradients[name] == pytest.approx(without.gradients[name], rel=1e-8, abs=1e-8 * most)
 
 
+@pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("ends", ["from: low, to: posts", "from: posts, to: low"])
-def test_springs_to_a_grid_on_the_ground_are_those_of_another_law(ends: str) -> None:
+def test_springs_to_a_grid_on_the_ground_are_those_of_another_law(ends: str, integrator: str) -> None:
     grid = "{plane: {corner: [-2, -2, -1], edges: [[4, 0, 0], [0, 4, 0]], count: [6, 3]}}"
     added = f"  posts: {{body: ground, grid: {grid}}}\nmembers:\n  stays: {{{ends}, law: STAY}}\n"
     text = CASE.replace("DAMPING", "damping: 2").replace("members:\n", added)
     springs, others = (
-        evaluated(text.replace("STAY", law))
+        evaluated(text.replace("STAY", law), integrator)
         for law in ("{type: spring, stiffness: 30}", "{type: cubic, stiffness: 30, cubic: 0}")
     )
     for name, value in others.objectives.items():

@@ -17,6 +17,7 @@ def spun(over_time, component="z", **response):
     overrides = {
         "bodies.hull.angular_velocity": [0, 0, 30],
         "objectives": {"turn": {"response": {"rotation": keys}, "over_time": over_time}},
+        "solver.integrator": "runge_kutta",
     }
     return mdstopo.load_case(CASES / "springs.yaml", overrides=overrides)
 
