@@ -204,10 +204,10 @@ def _held_at(driver: "GeneralDriver", j: int, row: FloatArray, count: int) -> Fl
         )  # fmt: skip
 
     call("hold for the system", none)
-    moving = np.concatenate([np.flatnonzero(model.free), np.arange(n, size)])
-    found = np.zeros(size)
     # least squares of least norm: free bodies make it singular
-    found[moving] = np.linalg.lstsq(matrix[np.ix_(moving, moving)].T, right[moving], rcond=DROPPED)[0]
+    moving = np.concatenate([model.free != 0, np.ones(size - n, dtype=np.bool_)])
+    found = np.zeros(size)
+    found[moving] = np.linalg.lstsq(matrix[moving][:, moving].T, right[moving], rcond=DROPPED)[0]
     z[:] = found[:n]
     call("hold for the gradient", z)
     out = out.copy()
