@@ -445,6 +445,10 @@ class Evaluator:
         """Compile what evaluates responses and gradients from steps, without any steps (`SceneDriver`)."""
         self._unused().compile_responses()
 
+    def compile_method(self, method: str) -> None:
+        """Compile what a method of differentiation calls beside that, of a scene with joints or other laws."""
+        cast("GeneralDriver", self._unused()).compile_method(method)
+
     def compile_steps(self) -> None:
         """Compile what makes steps of a scene with joints or other laws, without making any."""
         cast("GeneralDriver", self._unused()).compile_steps()

@@ -118,7 +118,7 @@ def command(
         from mdstopo.status import RunStatus
         from mdstopo.store.contents import design_part, sensitivity_part
 
-        with compiling_in_background(case, RESPONSES):
+        with compiling_in_background(case, RESPONSES, methods):
             engine = evaluator_of(case)
             check_design(engine, alpha, alpha_path)
             datasets: dict[str, Any] = design_part(case, engine.design(alpha))

@@ -539,11 +539,8 @@ class GeneralDriver:
 
     def _integral_with_gradient(self, j: int, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
         """The integral of response j (2: of its square), and on demand its gradient into out (N + P,)."""
-        total: float = self.ready(
-            "integral_with_gradient", self.entry.integral_with_gradient, *self.steps_arguments(count), j, integral,
-            gradient, self.room, self.room_ints, self.member_state, self.padded, self._integral_gradient,
-            self.start_vjp, self.work,
-        )  # fmt: skip
+        arguments = self._integral_arguments(j, integral, count, gradient)
+        total: float = self.ready("integral_with_gradient", self.entry.integral_with_gradient, *arguments)
         if gradient:
             out[:] = self._integral_gradient
             if self.start is not None:
@@ -551,6 +548,13 @@ class GeneralDriver:
                     self.start_vjp += self.start.since.integral_cotangent(j, integral, count)
                 self.start.vjp(self.start_vjp, out)
         return total
+
+    def _integral_arguments(self, j: int, integral: int, count: int, gradient: bool) -> tuple[Any, ...]:
+        """All arguments of `integral_with_gradient`."""
+        return (
+            *self.steps_arguments(count), j, integral, gradient, self.room, self.room_ints, self.member_state,
+            self.padded, self._integral_gradient, self.start_vjp, self.work,
+        )  # fmt: skip
 
     def start_from(self, q: FloatArray, response_par: FloatArray | None = None) -> None:
         """Take other positions q (n_q,) at the start, and other numbers of responses; None: those of the scene."""
@@ -586,6 +590,14 @@ class GeneralDriver:
             self.row_gradients.compile()
         if any(reduction.is_largest for reduction in reductions):
             entry.peaks_of_steps.compile(*self._history_arguments(0), 0, True, True, 0.0, self._rows_of[0], self.work)
+        if any(reduction.is_integral for reduction in reductions):
+            entry.integral_with_gradient.compile(*self._integral_arguments(0, 1, 0, True))
+
+    def compile_method(self, method: str) -> None:
+        """Compile what a method of differentiation calls beside that, without any steps."""
+        from mdstopo.general import methods
+
+        methods.compile_method(self, method)
 
     def _history_arguments(self, count: int) -> tuple[Any, ...]:
         """The arguments with which every entry begins that reads the history of steps."""

@@ -124,12 +124,27 @@ def _push(driver: "GeneralDriver", count: int, block: Block, integral: int, swee
 
     Returns the step where sweeps did not settle, or -1.
     """
-    stopped: int = driver.ready(
-        f"push {len(block.rows)}", driver.entry.push, *driver.steps_arguments(count), block.which, block.rows, integral,
-        sweeps, driver.room, driver.room_ints, driver.member_state, block.padded, block.out, driver.start_slopes(),
-        driver.work,
-    )  # fmt: skip
+    arguments = _push_arguments(driver, count, block, integral, sweeps, driver.start_slopes())
+    stopped: int = driver.ready(f"push {len(block.rows)}", driver.entry.push, *arguments)
     return stopped
+
+
+def _push_arguments(
+    driver: "GeneralDriver", count: int, block: Block, integral: int, sweeps: int, slopes: FloatArray
+) -> tuple[Any, ...]:
+    """All arguments of `direct.push`. driver, count, block, integral, sweeps: as of `_push`; slopes (M, n): of the
+    start."""
+    return (
+        *driver.steps_arguments(count), block.which, block.rows, integral, sweeps, driver.room, driver.room_ints,
+        driver.member_state, block.padded, block.out, slopes, driver.work,
+    )  # fmt: skip
+
+
+def compile_method(driver: "GeneralDriver", method: str) -> None:
+    """Compile what carries derivatives forward with the motion, for a method that does so, without any motion."""
+    if SENSITIVITIES[method].of_histories:
+        arguments = _push_arguments(driver, 0, driver.row_gradients.block(1), 0, 0, np.zeros((0, 0)))
+        driver.entry.push.compile(*arguments)
 
 
 def _without_sweeps(

@@ -14,7 +14,7 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from mdstopo.case.model import Case
@@ -71,16 +71,17 @@ def _compile_in_children(message: bytes, each: list[list[str]]) -> None:
 
 
 @contextlib.contextmanager
-def compiling_in_background(case: Case, share: str) -> Iterator[None]:
+def compiling_in_background(case: Case, share: str, methods: Sequence[str] = ()) -> Iterator[None]:
     """Meanwhile another process compiles a share of what a scene with joints or other laws needs, where nothing of it
-    is there yet: with RESPONSES what evaluates steps, with STEPS what makes them, where `auto` has to.
+    is there yet: with RESPONSES what evaluates steps, and behind that what these methods of differentiation call; with
+    STEPS what makes steps, where `auto` has to.
 
     What this process does meanwhile finds on the disk what the other one has compiled.
     """
     child = None
     with contextlib.suppress(OSError):  # no process can be started, or it has ended
         if beyond_springs(case) and compilation_due(case):
-            child = _begin([share])
+            child = _begin([share, *methods])
             _tell(child, pickle.dumps(case))
     try:
         yield
@@ -135,7 +136,10 @@ def _main() -> None:
     case: Case = pickle.load(sys.stdin.buffer)
     end_with_parent(sys.stdin.buffer)
     if RESPONSES in sys.argv[1:]:
-        evaluator_of(case, in_background=False).compile_responses()
+        engine = evaluator_of(case, in_background=False)
+        engine.compile_responses()
+        for method in sys.argv[2:]:
+            engine.compile_method(method)
     elif STEPS in sys.argv[1:]:
         engine = evaluator_of(case, in_background=False)
         if engine.may_simulate_to_choose:

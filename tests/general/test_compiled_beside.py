@@ -26,11 +26,21 @@ objectives:
 #: a second objective: then all rows go through the steps in one sweep
 SECOND = "  turn: {response: {displacement: {body: rod, component: x}}, over_time: max_abs}\n"
 TOGETHER = "combine: {method: weighted_sum, weights: {tip: 1, turn: 1}}\n"
+MEAN = ("max_abs", "mean")
 
 
-@pytest.mark.parametrize(("more", "names"), [("", {"peaks_vjp"}), (SECOND + TOGETHER, {"rows_vjp", "peaks_of_steps"})])
-def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch, more: str, names: set[str]) -> None:
-    engine = Evaluator(read_case(CASE + more))
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        (CASE, {"peaks_vjp"}),
+        (CASE.replace(*MEAN), {"integral_with_gradient"}),
+        (CASE + SECOND + TOGETHER, {"rows_vjp", "peaks_of_steps"}),
+        (CASE + SECOND.replace(*MEAN) + TOGETHER, {"rows_vjp", "peaks_of_steps", "integral_with_gradient"}),
+    ],
+    ids=["peak", "mean", "peaks", "peak and mean"],
+)
+def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch, text: str, names: set[str]) -> None:
+    engine = Evaluator(read_case(text))
     looked_for = Entry._for
     asked: list[tuple[str, str | None]] = []
 
@@ -47,6 +57,28 @@ def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch, more: s
     evaluating = True
     assert np.all(np.isfinite(engine.evaluate(engine.case.start, gradient=True).gradients["tip"]))
     assert compiled <= set(asked)
+
+
+def test_it_is_what_a_method_calls_that_carries_derivatives_forward(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = Evaluator(read_case(CASE + SECOND.replace(*MEAN) + TOGETHER))
+    looked_for = Entry._for
+    asked: set[tuple[str, str | None]] = set()
+    monkeypatch.setattr(Entry, "_for", lambda entry, given: asked.add((entry.py_func.__name__, types_of(given))))
+    engine.compile_method("adjoint")
+    assert not asked
+    engine.compile_method("direct")
+    ((name, types),) = asked
+    assert name == "push"
+
+    def noted(entry: Entry, arguments: tuple[Any, ...]) -> Any:
+        seen.add((entry.py_func.__name__, types_of(arguments)))
+        return looked_for(entry, arguments)
+
+    seen: set[tuple[str, str | None]] = set()
+    monkeypatch.setattr(Entry, "_for", noted)
+    found = engine.evaluate(engine.case.start, sensitivity="direct")
+    assert np.all(np.isfinite(found.gradients["turn"]))
+    assert (name, types) in seen
 
 
 DAMPED = CASE.replace("stiffness: 50}", "stiffness: 50, damping: 2}")
