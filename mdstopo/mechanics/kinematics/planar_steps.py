@@ -46,7 +46,7 @@ def end_state(model, table, s, h, q0, v0, q, v, a, slopes, q_end, v_end):
 
 
 @part
-def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
+def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, turns, z):
     """The cotangent of the accelerations of stage j; see `kinematics_interface.stage_vjp`."""
     s, n = u.shape
     by_end = h * h * table[VECTORS, END, j]
