@@ -63,6 +63,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     pair_matrix_vjp,
     pair_pose_vjp,
     place_joint,
+    places_points,
     point_joint_vjp,
     pose_size,
     rotations,
@@ -611,23 +612,20 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
 
 
 @kernel
-def poses_vjp(model, workspace, rel, sums, turn, z, bar_q, bar_v):
-    """`carried_vjp` of poses and sums over members, where nothing is damped.
+def poses_vjp(model, workspace, rel, sums, z, bar_q):
+    """`carried_vjp` without the loads, of poses and sums over members, where nothing is damped.
 
     Constant:
       model: the compiled scene.
-      workspace: the workspace (`carries`, `switches`).
+      workspace: the workspace (`carries`).
       rel (n_pair, POSE), sums (n_pair, SUMS): of these pairs.
-      turn (n, `load_slopes`): slopes of the turning loads.
       z (n,): virtual displacements; driven parts are 0.
     Out:
-      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
+      bar_q (n,): cotangents of coordinates, added to.
     """
     for p in range(model.pair.shape[0]):
         if workspace.carries[p] != 0:
             pair_pose_vjp(model, p, rel, sums, z, bar_q)
-    if workspace.switches[TURNING] != 0:
-        turns_vjp(model, turn, z, bar_q, bar_v)
 
 
 @kernel
@@ -666,6 +664,8 @@ def place_joints(model, workspace, q, v, a, lam):
     lam (n_row,): multipliers (N, N m).
     """
     for j in range(model.joint.shape[0]):
+        if joint_is_point(model, j) and not places_points(model):
+            continue
         w = workspace.own[j, 0]
         wd = workspace.own[j, 1]
         wdd = workspace.own[j, 2]
@@ -682,12 +682,13 @@ def place_joints(model, workspace, q, v, a, lam):
 
 
 @kernel
-def joints_vjp(model, workspace, z, y, bar_q, bar_v):
+def joints_vjp(model, workspace, v, a, lam, z, y, bar_q, bar_v):
     """`accelerations_vjp` of the joints alone.
 
     Constant:
       model: the compiled scene.
-      workspace: the workspace, with the joints placed (`place_joints`).
+      workspace: the workspace, with the bodies turned and the joints placed (`place_joints`).
+      v, a (n,), lam (n_row,): velocities, accelerations and multipliers at the state.
       z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
         the joints' rows.
     Out:
@@ -696,8 +697,7 @@ def joints_vjp(model, workspace, z, y, bar_q, bar_v):
     row = model.row
     for j in range(model.joint.shape[0]):
         if joint_is_point(model, j):
-            own = workspace.own[j]
-            point_joint_vjp(model, j, own[0], own[1], own[2], own[3], z, y, bar_q, bar_v)
+            point_joint_vjp(model, j, workspace.own[j], workspace.turned, v, a, lam, z, y, bar_q, bar_v)
             continue
         pair_matrix_vjp(model, model.joint[j, JOINT_PAIR], workspace.stiffness[j], z, bar_q)
         for r in range(most_rows(model)):

@@ -170,7 +170,7 @@ def forces_of_sums(model, member_state, segment, t, q, v, tangent, rel, sums, k,
       workspace: the workspace, whose f is set (N, N m).
     Out:
       k, c (n_pair, 2 D, 2 D): on demand stiffness of the pairs, and damping where there is any.
-      turn (n, slopes): on demand slopes of the loads where they have any.
+      turn (n, slopes): on demand slopes of the loads where they have any, unless tangents are left unformed.
     """
     pair = model.pair
     f = workspace.f
@@ -190,7 +190,7 @@ def forces_of_sums(model, member_state, segment, t, q, v, tangent, rel, sums, k,
             elif workspace.switches[APART] == 0:
                 none = k[p]
                 none[:] = 0.0
-        if workspace.switches[TURNING] != 0:
+        if workspace.switches[TURNING] != 0 and workspace.switches[UNFORMED] == 0:
             load_tangent(model, segment, t, q, v, turn)
     if model.contact_pair.shape[0] > 0:
         add_contacts(model, member_state, rel, q, v, tangent, f, k, c)

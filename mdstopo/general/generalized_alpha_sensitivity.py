@@ -12,7 +12,7 @@ from mdstopo.general.accelerations import OF_STEP
 from mdstopo.general.generalized_alpha import TAG
 from mdstopo.general.method_interface import implement
 from mdstopo.general.projection import project_back, project_forward
-from mdstopo.general.step_history import FIRST, copy_vector
+from mdstopo.general.step_history import FIRST, SEGMENT, copy_vector
 from mdstopo.general.step_linear import (
     find_sweep,
     keep_free,
@@ -120,7 +120,7 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
         w_v = h * gamma * e1 if j == last else 0.0
         if j == last:
             shift_tangents(model, history.q[w], history.stage_q[o + j], workspace.tangents[OF_STEP])
-        prepare_stage_back(model, history, o + j, w_q, w_v, workspace)
+        prepare_stage_back(model, history, history.index[w, SEGMENT], o + j, w_q, w_v, workspace)
         for m in range(count):
             _stage_row_back(
                 model, history, w, o, j, last, h, weights, bars, rows_bar, lam_x[m], z[m, j], y, bar_q[m], bar_v[m],
@@ -186,7 +186,7 @@ def _stage_row_back(
             x[d] = bar_a[d] if j == 0 else -bar_x[d]
         if spread:
             x[d] += bars[j, 2, d]
-    stage_back(model, history, o + j, workspace, x, y, bar_q, bar_v)
+    stage_back(model, history, history.index[w, SEGMENT], o + j, workspace, x, y, bar_q, bar_v)
     for i in range(model.driven.shape[0]):
         bar_q[model.driven[i]] = 0.0
         bar_v[model.driven[i]] = 0.0
@@ -235,7 +235,8 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
         w_v = h * gamma * e1 if j == last else 0.0
         if j == last:
             shift_tangents(model, history.q[w], history.stage_q[o + j], workspace.tangents[OF_STEP])
-        k, c_stage = prepare_stage_forward(model, history, o + j, w_q, w_v, sweeps, workspace)
+        segment = history.index[w, SEGMENT]
+        k, c_stage = prepare_stage_forward(model, history, segment, o + j, w_q, w_v, sweeps, workspace)
         sweeping = sweeps > 0 and j == last
         if sweeping:
             find_sweep(model, history, o + j, k, c_stage, w_q, w_v, workspace, by_change)

@@ -70,8 +70,9 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
     slope = jac.reshape(jac.size)
     weighed = pull.reshape(pull.size)
     whole = spread.reshape(spread.size)
-    for e in range(slope.shape[0]):
-        weighed[e] = slope[e] * whole[e]
+    for r in range(line.shape[0]):  # joints have room for more rows than most have
+        for e in range(line[r, 0], line[r, 0] + pull.shape[2]):
+            weighed[e] = slope[e] * whole[e]
     constant = model.schur_constant
     for e in range(gram.shape[0]):
         gram[e] = constant[e]
@@ -80,8 +81,13 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
         one = product[m, 1]
         two = product[m, 2]
         value = gram[entry]
-        for c in range(product[m, 3]):
-            value += slope[one + c] * weighed[two + c]
+        if product[m, 3] == 3:  # as turns in space have components: a loop would take as long as what is in it
+            value += slope[one] * weighed[two]
+            value += slope[one + 1] * weighed[two + 1]
+            value += slope[one + 2] * weighed[two + 2]
+        else:
+            for c in range(product[m, 3]):
+                value += slope[one + c] * weighed[two + c]
         gram[entry] = value
     at = decompose(envelope, gram, diagonal)
     if at < 0 and thorough:
@@ -102,21 +108,30 @@ def decompose(envelope, gram, diagonal):
     """
     i = 0
     while i < envelope.shape[0]:
-        together = in_pairs(envelope, i)
-        at = _decompose_two(envelope, gram, diagonal, i) if together else _decompose_one(envelope, gram, diagonal, i)
+        together = rows_together(envelope, i)
+        if together == 3:
+            at = _decompose_three(envelope, gram, diagonal, i)
+        elif together == 2:
+            at = _decompose_two(envelope, gram, diagonal, i)
+        else:
+            at = _decompose_one(envelope, gram, diagonal, i)
         if at >= 0:
             return at
-        i += 2 if together else 1
+        i += together
     return -1
 
 
 @part
-def in_pairs(envelope, i):
-    """Whether the stored parts of rows i and i + 1 begin at the same column, as those of one joint do.
+def rows_together(envelope, i):
+    """How many rows from row i on, three at most, have stored parts that begin at the same column, as those of one
+    joint do.
 
-    Then both are factorised at once, which is faster: the products of one do not wait for those of the other.
+    These are factorised at once, which is faster: the products of one do not wait for those of the others.
     """
-    return i + 1 < envelope.shape[0] and envelope[i + 1, 0] == envelope[i, 0]
+    count = envelope.shape[0]
+    if i + 1 >= count or envelope[i + 1, 0] != envelope[i, 0]:
+        return 1
+    return 3 if i + 2 < count and envelope[i + 2, 0] == envelope[i, 0] else 2
 
 
 @part
@@ -188,6 +203,74 @@ def _decompose_two(envelope, gram, diagonal, i):
     return -1
 
 
+@part
+def _decompose_three(envelope, gram, diagonal, i):
+    """Rows i, i + 1 and i + 2 of `decompose`. Returns the one at which the matrix is singular, or -1."""
+    inverse = diagonal[1]
+    first = envelope[i, 0]
+    one = envelope[i, 1]
+    two = envelope[i + 1, 1]
+    three = envelope[i + 2, 1]
+    for j in range(first + 1, i):
+        other = envelope[j, 1]
+        value = gram[one + j]
+        second = gram[two + j]
+        third = gram[three + j]
+        for k in range(max(first, envelope[j, 0]), j):
+            factor = gram[other + k]
+            value -= gram[one + k] * factor
+            second -= gram[two + k] * factor
+            third -= gram[three + k] * factor
+        gram[one + j] = value
+        gram[two + j] = second
+        gram[three + j] = third
+    whole = gram[one + i]
+    whole_second = gram[two + i + 1]
+    whole_third = gram[three + i + 2]
+    value = whole
+    by_first = gram[two + i]
+    second = whole_second
+    third_by_first = gram[three + i]
+    third_by_second = gram[three + i + 1]
+    third = whole_third
+    for k in range(first, i):
+        scaled = gram[one + k] * inverse[k]
+        scaled_second = gram[two + k] * inverse[k]
+        scaled_third = gram[three + k] * inverse[k]
+        value -= gram[one + k] * scaled
+        by_first -= gram[two + k] * scaled
+        second -= gram[two + k] * scaled_second
+        third_by_first -= gram[three + k] * scaled
+        third_by_second -= gram[three + k] * scaled_second
+        third -= gram[three + k] * scaled_third
+        gram[one + k] = scaled
+        gram[two + k] = scaled_second
+        gram[three + k] = scaled_third
+    diagonal[0, i] = whole
+    diagonal[0, i + 1] = whole_second
+    diagonal[0, i + 2] = whole_third
+    if value <= SINGULAR * whole:
+        return i
+    inverse[i] = 1.0 / value
+    scaled = by_first * inverse[i]
+    gram[two + i] = scaled
+    second -= by_first * scaled
+    if second <= SINGULAR * whole_second:
+        return i + 1
+    inverse[i + 1] = 1.0 / second
+    third_by_second -= third_by_first * scaled
+    scaled = third_by_first * inverse[i]
+    scaled_second = third_by_second * inverse[i + 1]
+    gram[three + i] = scaled
+    gram[three + i + 1] = scaled_second
+    third -= third_by_first * scaled
+    third -= third_by_second * scaled_second
+    if third <= SINGULAR * whole_third:
+        return i + 2
+    inverse[i + 2] = 1.0 / third
+    return -1
+
+
 @kernel
 def growth(envelope, gram, diagonal, x):
     """A sum of squares that is large where the smallest eigenvalue is small, and the row that has the largest part
@@ -242,7 +325,6 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
       x (n_row,): scratch.
     """
     line = model.row_layout
-    envelope = model.skyline
     weighed = pull.reshape(pull.size)
     count = line.shape[0]
     each = freedoms(model)
@@ -256,18 +338,33 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
             first += weighed[e + i] * a[one + i]
             second += weighed[e + each + i] * a[two + i]
         x[line[r, 3]] = first + second - lam[r]
-    substitute(envelope, gram, diagonal, x)
+    substitute(model.skyline, gram, diagonal, x)
     for d in range(a.shape[0]):
         a[d] *= inverse[d]
     for r in range(count):
+        lam[r] = x[line[r, 3]]
+    r = 0
+    while r < count:  # three rows of the same bodies at once, as most joints have
         e = line[r, 0]
         one = line[r, 1]
         two = line[r, 2]
-        value = x[line[r, 3]]
-        lam[r] = value
+        value = lam[r]
+        if r + 2 < count and line[r + 2, 0] == e + 4 * each and line[r + 2, 1] == one and line[r + 2, 2] == two:
+            second = lam[r + 1]
+            third = lam[r + 2]
+            f = e + 2 * each
+            g = f + 2 * each
+            for i in range(each):
+                a[one + i] = a[one + i] - weighed[e + i] * value - weighed[f + i] * second - weighed[g + i] * third
+            for i in range(each, 2 * each):
+                d = two + i - each
+                a[d] = a[d] - weighed[e + i] * value - weighed[f + i] * second - weighed[g + i] * third
+            r += 3
+            continue
         for i in range(each):
             a[one + i] -= weighed[e + i] * value
             a[two + i] -= weighed[e + each + i] * value
+        r += 1
 
 
 @kernel
@@ -276,30 +373,62 @@ def substitute(envelope, gram, diagonal, x):
     count = envelope.shape[0]
     i = 0
     while i < count:
-        together = in_pairs(envelope, i)
-        own = envelope[i, 1]
-        following = envelope[i + 1, 1] if together else own
+        together = rows_together(envelope, i)
+        one = envelope[i, 1]
+        two = envelope[i + 1, 1] if together > 1 else one
+        three = envelope[i + 2, 1] if together > 2 else two
         value = x[i]
-        second = x[i + 1] if together else 0.0
+        second = x[i + 1] if together > 1 else 0.0
+        third = x[i + 2] if together > 2 else 0.0
         for k in range(envelope[i, 0], i):
-            value -= gram[own + k] * x[k]
-            second -= gram[following + k] * x[k]
+            value -= gram[one + k] * x[k]
+            second -= gram[two + k] * x[k]
+            third -= gram[three + k] * x[k]
         x[i] = value
-        if together:
-            x[i + 1] = second - gram[following + i] * value
-        i += 2 if together else 1
+        if together > 1:
+            second -= gram[two + i] * value
+            x[i + 1] = second
+        if together > 2:
+            x[i + 2] = third - gram[three + i] * value - gram[three + i + 1] * second
+        i += together
     for i in range(count):
         x[i] *= diagonal[1, i]
     i = count
     while i > 0:
-        together = i > 1 and in_pairs(envelope, i - 2)
-        following = envelope[i - 1, 1]
-        second = x[i - 1]
-        i -= 2 if together else 1
-        own = envelope[i, 1]
-        value = 0.0
-        if together:
-            value = x[i] - gram[following + i] * second
-            x[i] = value
+        i = _substitute_back(envelope, gram, x, i)
+
+
+@part
+def _substitute_back(envelope, gram, x, end):
+    """The last part of `substitute` for rows before `end` that begin at one column. Returns the first of these.
+
+    Of more than three such rows the last two are taken, so that sums do not depend on who takes three at once.
+    """
+    same = 1
+    while same < 4 and same < end and envelope[end - 1 - same, 0] == envelope[end - 1, 0]:
+        same += 1
+    together = same if same < 4 else 2
+    i = end - together
+    one = envelope[i, 1]
+    value = x[i]
+    if together == 3:
+        two = envelope[i + 1, 1]
+        three = envelope[i + 2, 1]
+        third = x[i + 2]
+        second = x[i + 1] - gram[three + i + 1] * third
+        value -= gram[two + i] * second + gram[three + i] * third
+        x[i] = value
+        x[i + 1] = second
         for k in range(envelope[i, 0], i):
-            x[k] -= gram[own + k] * value + gram[following + k] * second
+            x[k] = (x[k] - (gram[two + k] * second + gram[three + k] * third)) - gram[one + k] * value
+        return i
+    two = one
+    second = 0.0
+    if together == 2:
+        two = envelope[i + 1, 1]
+        second = x[i + 1]
+        value -= gram[two + i] * second
+        x[i] = value
+    for k in range(envelope[i, 0], i):
+        x[k] -= gram[one + k] * value + gram[two + k] * second
+    return i

@@ -87,7 +87,11 @@ class StepHistory:
         Field("posed, n_pair, of_sums", "of these Q, E, E_xi and K by the relative pose (`strides.sums_size`)"),
     ]
     turn: Annotated[
-        FloatArray, Field("stages, n, load_slopes", "slopes of the loads by their bodies' turns and turning rates")
+        FloatArray,
+        Field(
+            "formed, n, load_slopes",
+            "slopes of the loads by their bodies' turns and turning rates, unless `rel` and `sums` are kept",
+        ),
     ]
     turned: Annotated[FloatArray, Field("factored, n_body, attitude", "attitudes of the bodies")]
     pull: Annotated[
@@ -160,7 +164,8 @@ def keep_stage(model, history, o, t, q, v, a, lam, workspace, tangent):
     copy_vector(lam, history.lam[o])
     if not tangent:
         return
-    _copy(workspace.turn, history.turn[o])
+    if not has_poses(history):
+        _copy(workspace.turn, history.turn[o])
     damped = workspace.switches[DAMPED] != 0  # else nobody reads C
     apart = has_factors(history)
     for p in range(workspace.k.shape[0]):

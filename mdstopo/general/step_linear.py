@@ -3,7 +3,6 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.places import index
 from mdstopo.general.accelerations import (
     NO_SHIFT,
     OF_STEP,
@@ -21,14 +20,16 @@ from mdstopo.general.accelerations import (
 from mdstopo.general.joint_matrix import solve_joints
 from mdstopo.general.method_interface import is_explicit
 from mdstopo.general.projection import project_back, project_forward
-from mdstopo.general.step_history import FIRST, copy_carried, has_factors, has_poses, mass_of
+from mdstopo.general.step_history import FIRST, SEGMENT, copy_carried, has_factors, has_poses, mass_of
 from mdstopo.general.step_inside import table_of_step
-from mdstopo.general.switches import DAMPED
+from mdstopo.general.switches import DAMPED, TURNING
 from mdstopo.integrators.runge_kutta_tables import AA, A
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_shift,
     end_jvp,
+    load_tangent,
+    loads_vjp,
     pair_tangent,
     stage_jvp,
     stage_vjp,
@@ -42,8 +43,13 @@ SETTLED = 1e-12
 
 
 @kernel
-def lay_out(model, history, o, workspace):
-    """Put the joints of stage o, with their slopes, into the workspace. Returns K and C of the stage."""
+def lay_out(model, history, segment, o, workspace):
+    """Put the joints of stage o, with their slopes, into the workspace. Returns K and C of the stage.
+
+    model: the compiled scene. history: the history of steps (`StepHistory`).
+    segment, o: the segment of `model.times` that the stage is in, and its number.
+    workspace: workspace of a balance, which takes slopes of the loads, too, where they are not kept (`load_slopes_of`).
+    """
     q = history.stage_q[o]
     v = history.stage_v[o]
     if has_factors(history):
@@ -61,6 +67,8 @@ def lay_out(model, history, o, workspace):
                 copy_carried(workspace.carries[p], history.C[o, p], workspace.c[p])
         k = workspace.k
         c = workspace.c
+        if has_poses(history) and workspace.switches[TURNING] != 0:
+            load_tangent(model, segment, history.when[o], q, v, workspace.turn)
     else:
         k = history.K[o]
         c = history.C[o]
@@ -70,13 +78,22 @@ def lay_out(model, history, o, workspace):
     return k, c
 
 
+@part
+def load_slopes_of(history, o, workspace):
+    """(n, `load_slopes`): slopes of the loads at stage o, which `lay_out` has put into the workspace.
+
+    history: the history of steps (`StepHistory`). workspace: workspace of a balance.
+    """
+    return workspace.turn if has_poses(history) else history.turn[o]
+
+
 @kernel
-def prepare_stage_back(model, history, o, w_q, w_v, workspace):
+def prepare_stage_back(model, history, segment, o, w_q, w_v, workspace):
     """Prepare a stage for `stage_back`: once for any number of rows.
 
     model: the compiled scene.
     history: the history of steps (`StepHistory`).
-    o: number of the stage.
+    segment, o: the segment of `model.times` that the stage is in, and its number.
     w_q, w_v: weights of the stiffness (s^2) and the damping (s); 0 where factors are kept.
     workspace: workspace of a balance, which takes what is prepared.
     """
@@ -84,7 +101,7 @@ def prepare_stage_back(model, history, o, w_q, w_v, workspace):
         copy_rows(history.turned[o], workspace.turned)
         place_joints(model, workspace, history.stage_q[o], history.stage_v[o], history.stage_a[o], history.lam[o])
         return
-    k, c = lay_out(model, history, o, workspace)
+    k, c = lay_out(model, history, segment, o, workspace)
     factor_matrix(
         model, workspace, k, c, history.turn[o], mass_of(history, o), w_q, w_v,
         workspace.tangents[OF_STEP], np.bool_(True),
@@ -92,14 +109,15 @@ def prepare_stage_back(model, history, o, w_q, w_v, workspace):
 
 
 @kernel
-def stage_back(model, history, o, workspace, z, y, bar_q, bar_v):
+def stage_back(model, history, segment, o, workspace, z, y, bar_q, bar_v):
     """Pull cotangents of a stage's accelerations and multipliers back to its coordinates and velocities.
 
     Constant:
       model: the compiled scene.
       history: the history of steps (`StepHistory`).
     In:
-      o: number of the stage, the one that was prepared last (`prepare_stage_back`).
+      segment, o: the segment of `model.times` that the stage is in, and its number; it was prepared last
+        (`prepare_stage_back`).
       workspace: workspace of a balance, with what was prepared.
     In place:
       z (n,), y (n_row,): cotangents of accelerations and multipliers, then the virtual displacement of the balance and
@@ -110,10 +128,14 @@ def stage_back(model, history, o, workspace, z, y, bar_q, bar_v):
     if has_factors(history):
         solve_joints(model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, z, y)
         if has_poses(history):
-            poses_vjp(model, workspace, history.rel[o], history.sums[o], history.turn[o], z, bar_q, bar_v)
+            poses_vjp(model, workspace, history.rel[o], history.sums[o], z, bar_q)
+            if workspace.switches[TURNING] != 0:
+                q = history.stage_q[o]
+                loads_vjp(model, segment, history.when[o], q, history.stage_v[o], z, bar_q, bar_v)
         else:
             carried_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, bar_q, bar_v)
-        joints_vjp(model, workspace, z, y, bar_q, bar_v)
+        v = history.stage_v[o]
+        joints_vjp(model, workspace, v, history.stage_a[o], history.lam[o], z, y, bar_q, bar_v)
         return
     solve_unknowns(model, workspace, z, y)
     accelerations_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, y, bar_q, bar_v)
@@ -156,6 +178,7 @@ def steps_back(tag, model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, 
     count, n = lam_q.shape
     table, s = table_of_step(tag, model, tables, history, w)
     o = history.index[w, FIRST]
+    segment = history.index[w, SEGMENT]
     h = history.t[w + 1] - history.t[w]
     work[REVERSE] += count
     push = history.push[w + 1]
@@ -164,14 +187,15 @@ def steps_back(tag, model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, 
     v = history.stage_v[o : o + s]
     u = np.zeros((count, s, n))
     g = np.zeros((count, s, n))
+    turns = np.empty((s, n))
     for back in range(s):
         j = s - 1 - back
         w_q, w_v = own_weights(tag, table, j, h)
-        prepare_stage_back(model, history, o + j, w_q, w_v, workspace)
+        prepare_stage_back(model, history, segment, o + j, w_q, w_v, workspace)
         for m in range(count):
             _runge_kutta_stage_back(
-                tag, model, table, history, o, j, h, q, v, bars, rows_bar, lam_q[m], lam_v[m], z[m], y, u[m], g[m],
-                workspace,
+                tag, model, table, history, segment, o, j, h, q, v, bars, rows_bar, lam_q[m], lam_v[m], z[m], y,
+                u[m], g[m], turns, workspace,
             )  # fmt: skip
     for m in range(count):
         start_vjp(model, table, s, h, q, v, u[m], g[m], lam_q[m], lam_v[m])
@@ -182,7 +206,7 @@ def steps_back(tag, model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, 
 
 @part
 def _runge_kutta_stage_back(
-    tag, model, table, history, o, j, h, q, v, bars, rows_bar, lam_q, lam_v, z, y, u, g, workspace
+    tag, model, table, history, segment, o, j, h, q, v, bars, rows_bar, lam_q, lam_v, z, y, u, g, turns, workspace
 ):  # fmt: skip
     """One stage of `steps_back`, for one row of cotangents.
 
@@ -192,6 +216,7 @@ def _runge_kutta_stage_back(
       table (3, 17, 17): coefficients of the method.
       history: the history of steps (`StepHistory`).
     In:
+      segment: the segment of `model.times` that the step is in.
       o, j: number of the step's first stage, and of this one counted from it; it has been prepared.
       h: length of the step (s).
       q (s, n_q), v (s, n): coordinates and velocities of its stages.
@@ -200,12 +225,12 @@ def _runge_kutta_stage_back(
       workspace: workspace of a balance, with what was prepared.
     Out:
       z (s or more, n): z[j], the virtual displacement of the stage's balance.
-      y (n_row,): scratch.
+      y (n_row,), turns (s, n): scratch (`stage_vjp`).
       u, g (s, n): u[j] and g[j], cotangents of the stage's coordinates and velocities; those of later stages are read.
     """
     n = u.shape[1]
     y[:] = 0.0
-    stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z[j])
+    stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, turns, z[j])
     if bars.shape[0] > 0:
         for d in range(n):
             z[j, d] += bars[j, 2, d]
@@ -217,7 +242,7 @@ def _runge_kutta_stage_back(
                 z[j, d] += w_q * u[j, d] + w_v * g[j, d]
         for r in range(y.shape[0]):
             y[r] = rows_bar[j, r]
-    stage_back(model, history, o + j, workspace, z[j], y, u[j], g[j])
+    stage_back(model, history, segment, o + j, workspace, z[j], y, u[j], g[j])
     for i in range(model.driven.shape[0]):
         u[j, model.driven[i]] = 0.0
         g[j, model.driven[i]] = 0.0
@@ -253,7 +278,7 @@ def changes_forward(tag, model, tables, history, w, dq, dv, force, stage_changes
         first[m] = 0 if is_zero(dq[m]) and is_zero(dv[m]) else -1
     for i in range(s):
         w_q, w_v = own_weights(tag, table, i, h)
-        k, c = prepare_stage_forward(model, history, o + i, w_q, w_v, 0, workspace)
+        k, c = prepare_stage_forward(model, history, history.index[w, SEGMENT], o + i, w_q, w_v, 0, workspace)
         for m in range(count):
             if first[m] == i and is_zero(force[m, i]):
                 stage_changes[m, i] = 0.0
@@ -340,17 +365,17 @@ def free_places(model):
 
 
 @kernel
-def prepare_stage_forward(model, history, o, w_q, w_v, sweeps, workspace):
+def prepare_stage_forward(model, history, segment, o, w_q, w_v, sweeps, workspace):
     """Prepare a stage for `stage_forward`: once for any number of changes. Returns its K and C.
 
     model: the compiled scene.
     history: the history of steps (`StepHistory`).
-    o: number of the stage.
+    segment, o: the segment of `model.times` that the stage is in, and its number.
     w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
     sweeps: above 0 where the sweeps of the iterative method account for that (`sweep`), 0 where the matrix W does.
     workspace: workspace of a balance, which takes what is prepared.
     """
-    k, c = lay_out(model, history, o, workspace)
+    k, c = lay_out(model, history, segment, o, workspace)
     if not has_factors(history):
         of_matrix = 0.0 if sweeps > 0 else 1.0  # sweeps account for the stage's own accelerations
         factor_matrix(
@@ -377,7 +402,7 @@ def stage_forward(model, history, o, k, c, workspace, dq, dv, force, row):
       row (n_row,): changes of the right side of the rows, then of the multipliers.
       workspace: workspace of a balance, with what was prepared.
     """
-    accelerations_jvp(model, workspace, k, c, history.turn[o], dq, dv, force, row)
+    accelerations_jvp(model, workspace, k, c, load_slopes_of(history, o, workspace), dq, dv, force, row)
     if has_factors(history):
         solve_joints(
             model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, force, row
@@ -436,11 +461,11 @@ def sweep(by_change, sweeps, room, force, row):
         change = 0.0
         size = 0.0
         for i in range(new.shape[0]):
-            value = force[index(i)] if i < n else row[index(i - n)]
+            value = force[i] if i < n else row[i - n]
             for d in range(n):
-                value += by_change[index(i), index(d)] * x[index(d)]
-            new[index(i)] = value
-            change = max(change, abs(value - x[index(i)]))
+                value += by_change[i, d] * x[d]
+            new[i] = value
+            change = max(change, abs(value - x[i]))
             size = max(size, abs(value))
         x[:] = new
         if not change < np.inf or change > 1e6 * last:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.places import index
 from mdstopo.compiler.vector import lanes, load, store, zero
 from mdstopo.general.gather import fill_poses
 from mdstopo.general.general_model import CODE, DESIGN, INERTER, PAIR
@@ -266,10 +265,10 @@ def carry_states(step, count, fresh, states):
             fourth = zero()
             for b in range(width):
                 x = load(room, vector * b)
-                first += x * step.by_state[index(b), index(d)]
-                second += x * step.by_state[index(b), index(two)]
-                third += x * step.by_state[index(b), index(three)]
-                fourth += x * step.by_state[index(b), index(four)]
+                first += x * step.by_state[b, d]
+                second += x * step.by_state[b, two]
+                third += x * step.by_state[b, three]
+                fourth += x * step.by_state[b, four]
             store(room, vector * (width + d), first)
             store(room, vector * (width + d + 1), second)
             store(room, vector * (width + d + 2), third)

@@ -10,7 +10,7 @@ from mdstopo.mechanics.laws.law_table import SPRING
 #: places of a workspace's `switches`: whether the mass is diagonal; whether the factors in the workspace are those of
 #: the joints' matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small
 #: eigenvalue; whether tangents leave out the joints' part; whether loads may depend on how bodies turn (else `turn`
-#: stays zero); whether tangents of pairs are left as what they follow from, poses and sums over members
+#: stays zero); whether tangents are left as what they follow from: poses and sums over members of pairs, and the state
 DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING, UNFORMED = range(7)
 #: which bodies of a pair move (`movers`)
 BOTH, SECOND, FIRST = 1, 2, 3

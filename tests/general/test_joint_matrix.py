@@ -11,6 +11,7 @@ from mdstopo.general.joint_matrix import decompose, substitute, weakest
 from mdstopo.general.switches import OF_JOINTS, UNFORMED
 from mdstopo.mechanics.kinematics.planar import turn_bodies
 from tests.compiled import compiled
+from tests.space.in_python import in_python  # noqa: F401
 
 #: every kind of joint; two of them share both bodies, one body is driven in part and one in all
 MECHANISM = """
@@ -194,3 +195,42 @@ def test_it_costs_a_closed_loop_what_its_length_costs():
     for short, long in zip(*costs, strict=True):
         assert long <= 4.5 * short
     assert costs[0][0] <= 26 * 6
+
+
+def skyline_of(runs):
+    """`GeneralModel.skyline` of rows of which so many behind each other begin at one column, and how many entries."""
+    rng, first = np.random.default_rng(len(runs)), []
+    for run in runs:
+        first += [int(rng.integers(0, len(first) + 1))] * run
+    lengths = np.arange(len(first)) - first + 1
+    ends = np.cumsum(lengths)
+    return np.stack([first, ends - lengths - first], axis=1), int(ends[-1])
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("runs", [(1, 2, 3), (3, 3, 1, 3), (4, 1, 5, 2), (6, 2, 3)])
+def test_rows_that_begin_at_one_column_are_factorised_together(runs):
+    envelope, entries = skyline_of(runs)
+    count, rng = len(envelope), np.random.default_rng(3)
+    places = [(i, k) for i, (first, _) in enumerate(envelope) for k in range(first, i + 1)]
+    lower, sizes = np.eye(count), rng.uniform(0.5, 2.0, count)
+    for i, k in places:
+        lower[i, k] = 1.0 if i == k else rng.normal() / count
+    whole = lower @ np.diag(sizes) @ lower.T
+    gram, diagonal = np.zeros(entries), np.zeros((2, count))
+    for i, k in places:
+        gram[envelope[i, 1] + k] = whole[i, k]
+    kept = gram.copy()
+    assert decompose(envelope, gram, diagonal) == -1
+    assert diagonal == pytest.approx(np.stack([np.diag(whole), 1.0 / sizes]), rel=1e-12)
+    for i, k in places:
+        if i != k:
+            assert gram[envelope[i, 1] + k] == pytest.approx(lower[i, k], abs=1e-12)
+    x = rng.normal(size=count)
+    expected = np.linalg.solve(whole, x)
+    substitute(envelope, gram, diagonal, x)
+    assert x == pytest.approx(expected, abs=1e-11)
+    for i in range(count):  # the row at which the matrix is singular is told, whatever its place among those
+        gram[:], at = kept, envelope[i, 1] + i
+        gram[at] -= sizes[i]
+        assert decompose(envelope, gram, diagonal) == i

@@ -180,6 +180,11 @@ def test_loads_and_gyroscopic_moments() -> None:
         expected[0, d, own : own + 3], expected[1, d, own : own + 3] = turn[d, :3], turn[d, 3:]
     same(expected[0], by_q(lambda q: loads(q, V), Q))
     same(expected[1], by_numbers(lambda v: loads(Q, v), V))
+    z, bar_q, bar_v = np.random.default_rng(8).normal(size=(3, N))
+    back_q, back_v = bar_q.copy(), bar_v.copy()
+    KERNELS.loads_vjp(MODEL, 0, 0.3, Q, V, z, back_q, back_v)
+    same(back_q - bar_q, expected[0].T @ z, 1e-13)
+    same(back_v - bar_v, expected[1].T @ z, 1e-13)
     own = MODEL.mass[3:6] * V[3:6]
     still = loads(Q, np.zeros(N))
     same((loads(Q, V) - still)[3:6], np.cross(own, V[3:6]), 1e-14)
@@ -223,6 +228,8 @@ def test_joints_of_a_point_alone_are_pulled_back_as_their_slopes_say() -> None:
     assert ROWS_OF[j] == 3
     rng, w, w_dot, w_ddot = np.random.default_rng(4), np.empty(42), V[:12], A[:12]
     KERNELS.place_joint_alone(MODEL, j, Q, w)
+    turned = np.empty((3, 18))
+    KERNELS.turn_bodies(MODEL, Q, turned)
     of_q, of_v, stiffness = np.zeros((ROWS, 12)), np.zeros((ROWS, 12)), np.zeros((12, 12))
     KERNELS.joint_acceleration_slopes(MODEL, j, w, w_dot, w_ddot, of_q, of_v)
     z, begun = rng.normal(size=N), rng.normal(size=(2, N))
@@ -237,7 +244,9 @@ def test_joints_of_a_point_alone_are_pulled_back_as_their_slopes_say() -> None:
         expected[0, :12] -= stiffness.T @ z[:12] + of_q[kept].T @ y[row[kept]]
         expected[1, :12] -= of_v[kept].T @ y[row[kept]]
         model = SimpleNamespace(**{**vars(MODEL), "row": np.tile(row, (8, 1))})
-        KERNELS.point_joint_vjp(model, j, w, w_dot, w_ddot, lam, z, y, *found)
+        of_rows = np.zeros(4)
+        of_rows[row[kept]] = lam[kept]
+        KERNELS.point_joint_vjp(model, j, np.empty((4, 0)), turned, V, A, of_rows, z, y, *found)
         same(found, expected, 1e-14)
 
 

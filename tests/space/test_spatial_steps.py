@@ -80,10 +80,10 @@ def test_derivatives_of_a_step_both_ways() -> None:
         return np.concatenate([SPATIAL.difference(there[0], end_q), there[1]])
 
     same(np.concatenate([end_dq, end_dv]), by_numbers(moved, np.zeros(1))[:, 0])
-    u, g, z = np.zeros((S, N)), np.zeros((S, N)), np.zeros(N)
+    u, g, turns, z = np.zeros((S, N)), np.zeros((S, N)), np.full((S, N), np.nan), np.zeros(N)
     start_q, start_v = bar_q.copy(), bar_v.copy()
     for j in reversed(range(S)):
-        KERNELS.stage_vjp(None, TABLE, h, j, q, v, start_q, start_v, u, g, z)
+        KERNELS.stage_vjp(None, TABLE, h, j, q, v, start_q, start_v, u, g, turns, z)
         u[j], g[j] = slopes[j].T @ z, BY_V.T @ z
     KERNELS.start_vjp(None, TABLE, S, h, q, v, u, g, start_q, start_v)
     assert start_q @ dq + start_v @ dv == pytest.approx(bar_q @ end_dq + bar_v @ end_dv, rel=1e-12)

@@ -332,7 +332,7 @@ def end_state(model, table, s, h, q0, v0, q, v, a, slopes, q_end, v_end):
     raise NotImplementedError
 
 
-def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
+def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, turns, z):
     """The cotangent of a stage's accelerations, from those of what depends on them.
 
     In:
@@ -344,6 +344,7 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
       lam_q, lam_v (n,): cotangents of the end's coordinates and velocities, when the last stage comes.
       u, g (s, n): cotangents of the coordinates and velocities of later stages; stages come one after the other from
         the last on, and what is left of all these, of the one behind j and of lam_q and lam_v, `start_vjp` needs.
+      turns (s, n): what a kinematics finds of all stages when the last one comes, and needs at the others.
     Out:
       z (n,): the cotangent.
     """
@@ -700,6 +701,18 @@ def load_tangent(model, segment, t, q, v, turn):
     raise NotImplementedError
 
 
+def loads_vjp(model, segment, t, q, v, z, bar_q, bar_v):
+    """Pull cotangents of what `add_loads` adds back to coordinates and velocities, without forming the slopes.
+
+    In:
+      model, segment, t, q, v: as of `add_loads`.
+      z (n,): the cotangents, as virtual displacements.
+    Out:
+      bar_q, bar_v (n,): added to.
+    """
+    raise NotImplementedError
+
+
 # Sizes of motions
 
 
@@ -1048,14 +1061,19 @@ def joint_is_point(model, j):
     raise NotImplementedError
 
 
-def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
+def places_points(model):
+    """Whether `point_joint_vjp` reads where the bodies of a joint are (`accelerations.place_joints`), or the state."""
+    raise NotImplementedError
+
+
+def point_joint_vjp(model, j, own, turned, v, a, lam, z, y, bar_q, bar_v):
     """`accelerations.joints_vjp` of a joint whose first rows put two points together and whose others are linear.
 
     In:
       model: the compiled scene.
       j: the joint.
-      w (PLACES,), wd, wdd (2 D,): where its bodies are, their velocities and accelerations.
-      lam (rows,): its multipliers.
+      own (4, PLACES): if it `places_points` where its bodies are, their velocities and accelerations, its multipliers.
+      turned (n_body, A), v, a (n,), lam (n_row,): attitudes, velocities, accelerations and multipliers of the state.
       z (n,), y (n_row,): adjoint variables of the equations of motion and of the joints' rows.
     Out:
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.

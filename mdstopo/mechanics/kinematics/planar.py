@@ -288,6 +288,15 @@ def load_tangent(model, segment, t, q, v, turn):
 
 
 @part
+def loads_vjp(model, segment, t, q, v, z, bar_q, bar_v):
+    """One slope a freedom, so they are formed; see `kinematics_interface.loads_vjp`."""
+    turn = np.zeros((z.shape[0], 1))
+    load_tangent(model, segment, t, q, v, turn)
+    for d in range(z.shape[0]):
+        bar_q[d - d % FREEDOMS + FREEDOMS - 1] += turn[d, 0] * z[d]
+
+
+@part
 def gross_loads(model, out):
     """The largest sizes of the applied loads; see `planar_scales.gross_loads`."""
     gross_steady_loads(model, out)
@@ -392,14 +401,22 @@ def joint_is_point(model, j):
 
 
 @part
-def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
+def places_points(model):
+    """See `kinematics_interface.places_points`."""
+    return True
+
+
+@part
+def point_joint_vjp(model, j, own, turned, v, a, lam, z, y, bar_q, bar_v):
     """The angles' part; see `kinematics_interface.point_joint_vjp`. Rows behind the first two have constant slopes."""
     row = model.row
     one = FREEDOMS * model.joint[j, 1] + 2
     two = FREEDOMS * model.joint[j, 2] + 2
     y0 = y[row[j, 0]] if row[j, 0] >= 0 else 0.0
     y1 = y[row[j, 1]] if row[j, 1] >= 0 else 0.0
-    first, second, rate_first, rate_second = revolute_vjp(model.joint_par[j], w, wd, wdd, lam, y0, y1, z[one], z[two])
+    first, second, rate_first, rate_second = revolute_vjp(
+        model.joint_par[j], own[0], own[1], own[2], own[3], y0, y1, z[one], z[two]
+    )
     bar_q[one] -= first
     bar_q[two] -= second
     bar_v[one] -= rate_first
@@ -431,6 +448,7 @@ _KERNELS = (
     planar_steps.quintic, planar_drives.drive_state, planar_drives.drive_acceleration,
     turn_bodies, planar_members.turn_of, relative_pose, turned_pose, pose_acceleration, pair_displacement,
     add_pair_force, pair_tangent, pair_matrix_vjp, pair_pose_vjp, pair_stiffness, turning_rate, add_loads, load_tangent,
+    loads_vjp,
     home_extent, deflection, largest_turn, motion_weights, noise_of, arm_of, gross_loads, add_gross_force,
     rounding_of_pairs,
     planar_members.stretch_of, planar_members.member_motion, planar_members.motion_of_ends, planar_members.member_work,
@@ -442,7 +460,7 @@ _KERNELS = (
     planar_members.spring_designs, planar_members.has_spring_energies,
     planar_members.spring_energies, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
     place_joint, place_joint_alone, joint_rows, joint_gamma, joint_velocity_slope, joint_acceleration_slopes,
-    joint_stiffness, joint_is_point, point_joint_vjp, transmitted, planar_bushings.add_bushings,
+    joint_stiffness, joint_is_point, places_points, point_joint_vjp, transmitted, planar_bushings.add_bushings,
     planar_contacts.contact_directions, planar_contacts.contact_seen, planar_contacts.contact_second_rise,
     planar_contacts.contact_distance, planar_contacts.contact_ends, planar_contacts.contact_drag,
     planar_contacts.add_contact, planar_points.point_motion,

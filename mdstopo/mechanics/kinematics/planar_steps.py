@@ -8,7 +8,6 @@ and all derivatives of it are its coefficients.
 """
 
 from mdstopo.compiler.jit import part
-from mdstopo.compiler.places import index
 
 #: planes of a method's table (`integrators.runge_kutta_tables`), and rows of its last one
 BY_STAGE, BY_RATE, VECTORS = range(3)
@@ -47,7 +46,7 @@ def end_state(model, table, s, h, q0, v0, q, v, a, slopes, q_end, v_end):
 
 
 @part
-def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
+def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, turns, z):
     """The cotangent of the accelerations of stage j; see `kinematics_interface.stage_vjp`."""
     s, n = u.shape
     by_end = h * h * table[VECTORS, END, j]
@@ -82,8 +81,8 @@ def stage_jvp(model, table, h, first, i, q, v, dq, dv, changes):
         position = dq[d] + h * table[VECTORS, NODES, i] * dv[d]
         speed = dv[d]
         for j in range(first, i):
-            position += h * h * table[BY_STAGE, i, index(j)] * changes[index(j), 2, d]
-            speed += h * table[BY_RATE, i, index(j)] * changes[index(j), 2, d]
+            position += h * h * table[BY_STAGE, i, j] * changes[j, 2, d]
+            speed += h * table[BY_RATE, i, j] * changes[j, 2, d]
         changes[i, 0, d] = position
         changes[i, 1, d] = speed
 
@@ -95,8 +94,8 @@ def end_jvp(model, table, s, h, q, v, changes, dq, dv):
         position = dq[d] + h * dv[d]
         speed = dv[d]
         for j in range(s):
-            position += h * h * table[VECTORS, END, index(j)] * changes[index(j), 2, d]
-            speed += h * table[VECTORS, END_RATE, index(j)] * changes[index(j), 2, d]
+            position += h * h * table[VECTORS, END, j] * changes[j, 2, d]
+            speed += h * table[VECTORS, END_RATE, j] * changes[j, 2, d]
         dq[d] = position
         dv[d] = speed
 

@@ -183,6 +183,50 @@ def _add_slopes(model, body, follows, arm, push, moment, rows, turn):
 
 
 @kernel
+def loads_vjp(model, segment, t, q, v, z, bar_q, bar_v):
+    """The transpose of `load_tangent`; see `kinematics_interface.loads_vjp`.
+
+    As z . (J d x omega + J omega x d) = d . (J (omega x z) + z x J omega).
+    """
+    tau = t - model.times[segment]
+    for body in range(model.home.shape[0]):
+        d = FREEDOMS * body
+        omega = vector_at(v, d + 3)
+        own = vector_at(z, d + 3)
+        spin = cross(own, _inertia_times(model, d, omega))
+        add(bar_v, d + 3, plus(_inertia_times(model, d, cross(omega, own)), spin))
+    for k in range(model.load_body.shape[0]):
+        rows = turn_at(model.home, model.load_body[k], q)
+        push = _load(model, segment, k, 0, tau)
+        moment = _load(model, segment, k, 3, tau)
+        arm = vector_at(model.load_arm[k], 0)
+        _pull_load_back(model, model.load_body[k], model.load_follows[k], arm, push, moment, rows, z, bar_q)
+    for k in range(model.timed_load.shape[0]):
+        body = model.timed_load[k, BODY]
+        rows = turn_at(model.home, body, q)
+        arm, push, moment = _timed_load(model, segment, k, t)
+        _pull_load_back(model, body, model.timed_load[k, TURNS], arm, push, moment, rows, z, bar_q)
+
+
+@part
+def _pull_load_back(model, body, follows, arm, push, moment, rows, z, bar_q):
+    """The transpose of `_add_slopes`.
+
+    model, body, follows, arm, push, moment, rows: as of it.
+    z (n,): cotangents of what the load adds.
+    bar_q (n,): in and out.
+    """
+    d = FREEDOMS * body
+    if follows == FOLLOWS:
+        add(bar_q, d + 3, cross(push, by_columns(rows, vector_at(z, d))))
+        return
+    own = vector_at(z, d + 3)
+    about = _inertia_times(model, d, own) if follows == ACCELERATES else own
+    turning = cross(about, by_columns(rows, moment))
+    add(bar_q, d + 3, plus(turning, cross(cross(own, arm), by_columns(rows, push))))
+
+
+@kernel
 def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
     """The tangents of a pair; see `kinematics_interface.pair_tangent`.
 

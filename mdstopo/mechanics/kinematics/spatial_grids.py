@@ -198,7 +198,7 @@ def _sum_tile(member, width, scale, start, row, first, last, length, p, r, count
     energy = zero()
     force = none, none
     slope = none, none
-    stiffness = none, none, (none, none, none), (none, none, none)
+    stiffness = none, none, (none, none, none), force
     for begin in range(first, last, lanes()):
         i = min(begin, length - lanes())
         done = (1 << (begin - i)) - 1
@@ -240,7 +240,7 @@ def _sum_tile(member, width, scale, start, row, first, last, length, p, r, count
         slope = force
     _add_sums(p[0], energy, force, slope, counted, o)
     if tangent:
-        _add_stiffness(stiffness, p[0], o)
+        _add_stiffness(stiffness, force[1], p[0], o)
 
 
 @part
@@ -278,7 +278,7 @@ def short_sums(member, width, scale, start, stop, length, p, r, counted, tangent
     none = zero(), zero(), zero()
     energy = zero()
     force = none, none
-    stiffness = none, none, (none, none, none), (none, none, none)
+    stiffness = none, none, (none, none, none), force
     step = period(length, lanes()) * lanes()
     for first in range(start, min(start + step, stop), lanes()):
         q = _rows(member, width, Q, first)
@@ -310,7 +310,7 @@ def short_sums(member, width, scale, start, stop, length, p, r, counted, tangent
             stiffness = _add_column(stiffness, a, weight, push, diagonal, others)
     _add_sums(p[0], energy, force, force, counted, o)
     if tangent:
-        _add_stiffness(stiffness, p[0], o)
+        _add_stiffness(stiffness, force[1], p[0], o)
 
 
 @part
@@ -361,21 +361,21 @@ def _stretch(moved, x, square, y, free, excess):
 def _add_column(sums, a, w, push, diagonal, others):
     """Sums of K with those of columns more: shifts by shifts (xx, yy, zz and yz, zx, xy), by turns, turns by turns.
 
-    sums: so far, rows of the last two. a: the arms (m). w, push: W (N/m) and sum w r (N).
+    Of turns by turns the symmetric part; the rest is half the moment (`_add_stiffness`).
+
+    sums: so far, rows of the third. a: the arms (m). w, push: W (N/m) and sum w r (N).
     diagonal, others: of G (N/m) xx, yy, zz, and yz, zx, xy.
     """
-    by_shift, across, by_turn, turns = sums
+    by_shift, across, by_turn, (turns, turns_across) = sums
     yz, zx, xy = others
-    # rows of sum g n (a x n)^T, then of sum g (a x n)(a x n)^T
+    # rows of sum g n (a x n)^T, from which sum g (a x n)(a x n)^T follows
     b0 = cross(a, (diagonal[0], xy, zx))
     b1 = cross(a, (xy, diagonal[1], yz))
     b2 = cross(a, (zx, yz, diagonal[2]))
-    t0 = minus(times(a[1], b2), times(a[2], b1))
-    t1 = minus(times(a[2], b0), times(a[0], b2))
-    t2 = minus(times(a[0], b1), times(a[1], b0))
     h = times(w, a)
     c = minus(h, push)
     trace = dot(a, c)
+    half = times(0.5, c)
     return (
         (by_shift[0] + (diagonal[0] + w), by_shift[1] + (diagonal[1] + w), by_shift[2] + (diagonal[2] + w)),
         plus(across, others),
@@ -385,21 +385,36 @@ def _add_column(sums, a, w, push, diagonal, others):
             plus(by_turn[2], (b2[0] + h[1], b2[1] - h[0], b2[2])),
         ),
         (
-            plus(turns[0], minus((t0[0] + trace, t0[1], t0[2]), times(a[0], c))),
-            plus(turns[1], minus((t1[0], t1[1] + trace, t1[2]), times(a[1], c))),
-            plus(turns[2], minus((t2[0], t2[1], t2[2] + trace), times(a[2], c))),
+            (
+                turns[0] + (trace - a[0] * c[0] + a[1] * b2[0] - a[2] * b1[0]),
+                turns[1] + (trace - a[1] * c[1] + a[2] * b0[1] - a[0] * b2[1]),
+                turns[2] + (trace - a[2] * c[2] + a[0] * b1[2] - a[1] * b0[2]),
+            ),
+            (
+                turns_across[0] + (a[2] * b0[2] - a[0] * b2[2] - a[1] * half[2] - a[2] * half[1]),
+                turns_across[1] + (a[0] * b1[0] - a[1] * b0[0] - a[2] * half[0] - a[0] * half[2]),
+                turns_across[2] + (a[1] * b2[1] - a[2] * b1[1] - a[0] * half[1] - a[1] * half[0]),
+            ),
         ),
     )
 
 
 @part
-def _add_stiffness(sums, k, o):
-    """Add k times the sums of K, vectors as of `_add_column`, to o (SUMS,)."""
-    diagonal, others, by_turn, turns = sums
+def _add_stiffness(sums, moment, k, o):
+    """Add k times the sums of K, vectors as of `_add_column`, to o (SUMS,).
+
+    moment: sum a x w r of all columns. The antisymmetric part of turns by turns, sum (a (w r)^T - (w r) a^T)/2, is it.
+    """
+    diagonal, others, by_turn, (turns, turns_across) = sums
     add_symmetric(o, 0, times(k, diagonal), times(k, others))
+    add_symmetric(o, 3, times(k, turns), times(k, turns_across))
     for i in range(3):
         add_coupling(o, i, times(k, by_turn[i]))
-        add_totals(o, K + FREEDOMS * (3 + i) + 3, turns[i], k)
+        half = 0.5 * k * total(moment[i])
+        row = (i + 1) % 3
+        column = (i + 2) % 3
+        o[K + FREEDOMS * (3 + row) + 3 + column] += half
+        o[K + FREEDOMS * (3 + column) + 3 + row] -= half
 
 
 @kernel
@@ -517,38 +532,23 @@ def short_designs(member, width, start, stop, length, k, rel, u, pair, out):
     Out:
       out (M or more,): added to.
     """
-    poses = rel.shape[0]
-    seen = np.empty((poses, SEEN + 3, lanes()))
     step = period(length, lanes()) * lanes()
     for first in range(start, min(start + step, stop), lanes()):
         q = _rows(member, width, Q, first)
-        for m in range(poses):
+        for m in range(rel.shape[0]):
             r = rel[m, pair]
             a = turned(r, S, q)
             end = plus(a, vector_at(r, D))
-            moved = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, q))
+            since = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, q))
+            moved = plus(since, since), dot(since, since)
             change = plus(vector_at(u[m, pair], 0), cross(vector_at(u[m, pair], 3), a))
-            own = seen[m]
-            for c in range(3):
-                store(own[c], 0, end[c])
-                store(own[3 + c], 0, 2.0 * moved[c])
-                store(own[SEEN + c], 0, change[c])
-            store(own[6], 0, dot(moved, moved))
-        for at in range(first, stop, step):
-            p = _rows(member, width, P, at)
-            free = load(member, L0 * width + at)
-            excess = load(member, EXCESS * width + at)
-            work = zero()
-            for m in range(poses):
-                own = seen[m]
-                x = minus((load(own[0], 0), load(own[1], 0), load(own[2], 0)), p)
-                moved = (load(own[3], 0), load(own[4], 0), load(own[5], 0)), load(own[6], 0)
+            for at in range(first, stop, step):
+                x = minus(end, _rows(member, width, P, at))
                 square = dot(x, x)
                 y = inverse_root(square, ZERO_LENGTH_SQUARED)
-                stretch = _stretch(moved, x, square, y, free, excess)
-                change = load(own[SEEN], 0), load(own[SEEN + 1], 0), load(own[SEEN + 2], 0)
-                work = work + stretch * y * dot(x, change)
-            store(out, at, load(out, at) + k * work)
+                free = load(member, L0 * width + at)
+                stretch = _stretch(moved, x, square, y, free, load(member, EXCESS * width + at))
+                store(out, at, load(out, at) + (k * stretch) * (y * dot(x, change)))
 
 
 @kernel

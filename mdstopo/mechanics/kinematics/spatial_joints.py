@@ -462,7 +462,24 @@ def joint_is_point(model, j):
 
 
 @part
-def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
+def places_points(model):
+    """See `kinematics_interface.places_points`."""
+    return False
+
+
+@part
+def _of_rows(model, j, x):
+    """What x (n_row,) has of the three rows of joint j; 0 for rows that are left out."""
+    row = model.row
+    return (
+        x[row[j, 0]] if row[j, 0] >= 0 else 0.0,
+        x[row[j, 1]] if row[j, 1] >= 0 else 0.0,
+        x[row[j, 2]] if row[j, 2] >= 0 else 0.0,
+    )
+
+
+@part
+def point_joint_vjp(model, j, own, turned, v, a, lam, z, y, bar_q, bar_v):
     """What turns do to D'' and to the multipliers' moments; see `kinematics_interface.point_joint_vjp`.
 
     With y_A = R_A^T y and l_A = R_A^T lam, -z . (s x l_A) has the slope (z x s) x l_A, and y . R_A s'' has s'' x y_A.
@@ -472,21 +489,19 @@ def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
     c = vector_at(par, SECOND_POINT)
     one = FREEDOMS * model.joint[j, 1] + 3
     two = FREEDOMS * model.joint[j, 2] + 3
-    own = (
-        y[model.row[j, 0]] if model.row[j, 0] >= 0 else 0.0,
-        y[model.row[j, 1]] if model.row[j, 1] >= 0 else 0.0,
-        y[model.row[j, 2]] if model.row[j, 2] >= 0 else 0.0,
-    )
-    pull = vector_at(lam, 0)
-    seen = turned_back(w, ONE + TURN, own)
-    omega = vector_at(wd, 3)
-    turning = cross(cross(vector_at(z, one), s), turned_back(w, ONE + TURN, pull))
-    add(bar_q, one, plus(turning, cross(_second(omega, vector_at(wdd, 3), s), seen)))
+    turn_one = turned[model.joint[j, 1]]
+    turn_two = turned[model.joint[j, 2]]
+    adjoint = _of_rows(model, j, y)
+    pull = _of_rows(model, j, lam)
+    seen = turned_back(turn_one, TURN, adjoint)
+    omega = vector_at(v, one)
+    turning = cross(cross(vector_at(z, one), s), turned_back(turn_one, TURN, pull))
+    add(bar_q, one, plus(turning, cross(_second(omega, vector_at(a, one), s), seen)))
     add(bar_v, one, _centripetal_slope(s, omega, seen))
-    seen = turned_back(w, TWO + TURN, own)
-    omega = vector_at(wd, 9)
-    turning = cross(turned_back(w, TWO + TURN, pull), cross(vector_at(z, two), c))
-    add(bar_q, two, plus(turning, cross(seen, _second(omega, vector_at(wdd, 9), c))))
+    seen = turned_back(turn_two, TURN, adjoint)
+    omega = vector_at(v, two)
+    turning = cross(turned_back(turn_two, TURN, pull), cross(vector_at(z, two), c))
+    add(bar_q, two, plus(turning, cross(seen, _second(omega, vector_at(a, two), c))))
     add(bar_v, two, times(-1.0, _centripetal_slope(c, omega, seen)))
 
 

@@ -10,6 +10,8 @@ Backwards, with u_i the cotangent of the turn of stage i, g_i that of its turnin
     bar omega_i = g_i + J(t_i)^-T bar k_i
 """
 
+import numpy as np
+
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.kinematics.planar_steps import BY_RATE, BY_STAGE, END, END_RATE, NODES, VECTORS, hermite
 from mdstopo.mechanics.kinematics.rotations import (
@@ -255,16 +257,27 @@ def end_state(model, table, s, h, q0, v0, q, v, a, slopes, q_end, v_end):
 
 
 @part
-def _end_turn(table, s, h, q, v, c, d):
+def _find_turns(q, c, d, turns):
+    """Find the rotation vectors from the start of a step to its stages.
+
+    q (s, n_q): coordinates of the stages. c, d: where the body begins in coordinates and in velocities.
+    turns (s, n): out, in the places of the turn.
+    """
+    start = quaternion_at(q[0], c + 3)
+    for j in range(turns.shape[0]):
+        put(turns[j], d + 3, turn_between(start, quaternion_at(q[j], c + 3)))
+
+
+@part
+def _end_turn(table, h, turns, v, d):
     """The rotation vector of the end of a step.
 
-    table, s, h, q (s, n_q), v (s, n): as of `end_state`. c, d: where the body begins in coordinates and in velocities.
+    table, h, v (s, n): as of `end_state`. turns (s, n): of `_find_turns`. d: where the body begins in velocities.
     """
     turn = (0.0, 0.0, 0.0)
-    start = quaternion_at(q[0], c + 3)
-    for j in range(s):
-        t = turn_between(start, quaternion_at(q[j], c + 3))
-        turn = plus(turn, times(h * table[VECTORS, END_RATE, j], vector_rate(t, vector_at(v[j], d + 3))))
+    for j in range(turns.shape[0]):
+        slope = vector_rate(vector_at(turns[j], d + 3), vector_at(v[j], d + 3))
+        turn = plus(turn, times(h * table[VECTORS, END_RATE, j], slope))
     return turn
 
 
@@ -284,26 +297,28 @@ def _slope_bars(table, h, i, u, out):
 
 
 @kernel
-def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
+def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, turns, z):
     """The cotangent of the accelerations of stage j; see `kinematics_interface.stage_vjp`.
 
     The turning parts of u and g of the stage behind j, which nobody reads any more, become bar t and bar omega. Until
     stage 0 comes, bar t_end waits in its place in u, which is 0 before and after; that of lam_q, from which it follows,
     becomes the cotangent of the turn of the start by all that comes behind stage j. What is summed over stages is so
-    for all bodies at once, as vectors; z is room for bar k until it is set.
+    for all bodies at once, as vectors; z is room for bar k until it is set. Turns are those of the stages from the
+    start of the step, in their places.
     """
     s, n = u.shape
     if j + 1 == s:
         for body in range(n // FREEDOMS):
             d = FREEDOMS * body
-            back = times(-1.0, _end_turn(table, s, h, q, v, COORDINATES * body, d))
+            _find_turns(q, COORDINATES * body, d, turns)
+            back = times(-1.0, _end_turn(table, h, turns, v, d))
             seen = vector_at(lam_q, d + 3)
             put(u[0], d + 3, turn_rate(back, seen))
             put(lam_q, d + 3, back_turned(back, seen))
     else:
         _slope_bars(table, h, j + 1, u, z)
         for body in range(n // FREEDOMS):
-            _stage_bars(j + 1, q, v, z, lam_q, u, g, COORDINATES * body, FREEDOMS * body)
+            _stage_bars(j + 1, turns, v, z, lam_q, u, g, FREEDOMS * body)
     if j == 0:
         _slope_bars(table, h, 0, u, z)
         for body in range(n // FREEDOMS):
@@ -326,15 +341,15 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
 
 
 @part
-def _stage_bars(i, q, v, bars, lam_q, u, g, c, d):
+def _stage_bars(i, turns, v, bars, lam_q, u, g, d):
     """Cotangents of a turn and a turning rate, in u and g (s, n) of stage i, become bar t and bar omega.
 
     u_i seen before the turn, exp(t) u_i = exp(t) J(t)^-T (J(t)^T u_i) = J(t)^-1 (J(t)^T u_i), is added to lam_q.
 
-    i: the stage. q (s, n_q), v (s, n), lam_q (n,): as of `stage_vjp`. bars (n,): of `_slope_bars`.
-    c, d: where the body begins.
+    i: the stage. turns, v (s, n), lam_q (n,): as of `stage_vjp`. bars (n,): of `_slope_bars`.
+    d: where the body begins.
     """
-    t = turn_between(quaternion_at(q[0], c + 3), quaternion_at(q[i], c + 3))
+    t = vector_at(turns[i], d + 3)
     bar = vector_at(bars, d + 3)
     own = turn_rate(times(-1.0, t), vector_at(u[i], d + 3))
     put(u[i], d + 3, plus(own, vector_rate_vjp(t, vector_at(v[i], d + 3), bar)))
@@ -409,6 +424,7 @@ def _slope_change(start, q, v, dq, change, c, d):
 @kernel
 def end_jvp(model, table, s, h, q, v, changes, dq, dv):
     """Changes of the end of a step; see `kinematics_interface.end_jvp`."""
+    turns = np.empty((s, dq.shape[0]))
     for body in range(dq.shape[0] // FREEDOMS):
         c = COORDINATES * body
         d = FREEDOMS * body
@@ -424,7 +440,8 @@ def end_jvp(model, table, s, h, q, v, changes, dq, dv):
             velocity = plus(velocity, times(w, vector_at(acceleration, d)))
             omega = plus(omega, times(w, vector_at(acceleration, d + 3)))
             turn = plus(turn, times(w, _slope_change(start, q[j], v[j], dq, changes[j], c, d)))
-        t = _end_turn(table, s, h, q, v, c, d)
+        _find_turns(q, c, d, turns)
+        t = _end_turn(table, h, turns, v, d)
         seen = plus(back_turned(t, vector_at(dq, d + 3)), turn_rate(t, turn))
         put(dq, d, place)
         put(dq, d + 3, seen)
