@@ -732,9 +732,9 @@ def accelerations_jvp(model, workspace, k, c, turn, dq, dv, force, row):
             for side in range(2):
                 first = place_in_pair(model, p, side * each)
                 for j in range(each):
-                    value += k[p, index(i), index(side * each + j)] * dq[index(first + j)]
+                    value += k[p, i, side * each + j] * dq[first + j]
                     if damped:
-                        value += c[p, index(i), index(side * each + j)] * dv[index(first + j)]
+                        value += c[p, i, side * each + j] * dv[first + j]
             force[place_in_pair(model, p, i)] -= value
     for d in range(dq.shape[0] if workspace.switches[TURNING] != 0 else 0):
         for r in range(rotations(model)):
