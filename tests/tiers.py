@@ -121,7 +121,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
         "fronts_of_uncertain",
     ),
     "sensitivity/test_agreement.py": ("generalized_alpha",),
-    "sensitivity/test_candidate_prices.py": ("[runge_kutta", "[generalized_alpha"),
+    "sensitivity/test_candidate_prices.py": ("are_built[runge_kutta", "[generalized_alpha"),
     "session/test_priced_candidates.py": ("bit[20", "bit[45", "members_with_slack"),
     "session/test_sizes.py": ("stopped_choice",),
     "session/test_starts_in_quotas.py": (
