@@ -1,4 +1,5 @@
-"""What has to hold beside the two sets of problems: the applications from three starts, and the paper's scenes."""
+"""What has to hold beside the two sets of problems: the applications from three starts, whether lower designs are near
+where they end, and the paper's scenes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +16,11 @@ Floats = NDArray[np.float64]
 
 #: applications, how far above the best of the starts each may end, and the excess over a limit that is allowed
 APPLICATIONS, ABOVE, KEPT = ("restraint", "tiedown", "mooring", "lander"), 0.02, 1e-5
+
+#: runs of one start, of an application from one of its first designs, beside whose ends lower designs are looked for
+ENDS = (("restraint", "half"), ("mooring", "few"), ("lander", "half"))
+#: from how many designs each, and how far these are off at most, and first steps go, in ranges of a variable
+BESIDE, OFF = 4, 0.01
 
 
 @dataclass(frozen=True)
@@ -88,6 +94,48 @@ def applications(names: Sequence[str] = APPLICATIONS) -> Iterator[Table]:
             "best of the three.",
         ),
     )
+
+
+def nearby(ends: Sequence[tuple[str, str]] = ENDS) -> Iterator[Table]:
+    """Where runs end that begin beside the end of another: at the same design, if that is a local optimum."""
+    rows = []
+    for name, start in ends:
+        case = load_case(CASES / f"{name}.yaml", overrides={"optimizer.starts": 1})
+        near = load_case(CASES / f"{name}.yaml", overrides={"optimizer.starts": 1, "optimizer.trust_start": OFF})
+        found = optimize(case, initial=first_designs(case)[start])
+        value, rng = value_of(case, found.objectives), np.random.default_rng(11)
+        above, moved = [], []
+        for _ in range(BESIDE):
+            off = OFF * (case.upper - case.lower) * rng.uniform(-1.0, 1.0, case.n_design)
+            other = optimize(near, initial=np.clip(found.alpha + off, case.lower, case.upper))
+            above.append(100.0 * (value_of(case, other.objectives) / value - 1.0))
+            moved.append(float(np.abs(other.alpha - found.alpha).max()))
+        state = found.states[found.best_start]
+        assert state is not None
+        rows.append(
+            [
+                name,
+                start,
+                f"{value:.5g}",
+                str(found.evaluations),
+                str(found.status).replace("_", " "),
+                f"{state.kkt:.1e}",
+                f"{min(above):.5f}",
+                f"{max(above):.5f}",
+                f"{max(moved):.2g}",
+            ]
+        )
+    yield Table(
+        "Runs from designs beside an end",
+        ("application", "start", "found", "evaluations", "last word", "KKT residual", "lowest beside, %", "highest, %",
+         "moved"),
+        rows,
+        (
+            f"One start each. Beside: {BESIDE} runs from the design that was found, each variable changed by up to "
+            f"{100 * OFF:g} % of its range at random, with first steps no longer than that; their values against its "
+            "own, and the largest difference of alpha between it and where they end.",
+        ),
+    )  # fmt: skip
 
 
 def first_designs(case: Case) -> dict[str, Floats | None]:

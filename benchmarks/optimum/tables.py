@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from benchmarks.optimum.acceptance import applications, eight_starts
+from benchmarks.optimum.acceptance import applications, eight_starts, nearby
 from benchmarks.optimum.families import families
 from benchmarks.optimum.problems import Problem, named
 from benchmarks.optimum.race import BUDGET, NEAR, STARTS, best_known, other_solvers_of, ours, within
@@ -16,7 +16,7 @@ ITERATIONS = (200, 50, 1000)
 #: evaluations within which a convex problem's optimum is to be reached
 WITHIN = 100
 #: what the tables are called on the command line
-PARTS = ("convex", "dynamic", "race", "families", "applications", "bars")
+PARTS = ("convex", "dynamic", "race", "families", "applications", "nearby", "bars")
 
 
 def everything(
@@ -38,6 +38,8 @@ def everything(
         yield from families()
     if "applications" in parts and not names:
         yield from applications()
+    if "nearby" in parts and not names:
+        yield from nearby()
     if "bars" in parts and not names:
         from benchmarks.bars import bars
 
