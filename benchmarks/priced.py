@@ -34,8 +34,10 @@ CHECKED = 100_000
 TIMED = 40_960
 #: of laws that switch, whose steps end at every switch of every candidate that is built
 FEW_CHECKED = 300
-#: points of the arm and of the floor, for a pass over 1e8 candidates of a scene with a joint
-DENSE = (2000, 50_000)
+#: points of the arm and of the floor, for passes over 1e6, 1e7 and 1e8 candidates of a scene with a joint, and of the
+#: floor in space along its sides
+DENSE = ((200, 5000), (500, 20_000), (2000, 50_000))
+SIDES = {5000: [100, 50], 20_000: [200, 100], 50_000: [250, 200]}
 #: members that are built in such a scene, as at an optimum
 BUILT = 100
 #: candidates from which on a run of all of them ends after so many iterations
@@ -43,7 +45,7 @@ MANY, SHORT = 500_000, 20
 #: the run that a process of its own makes, whose memory is its own
 PROGRAM = "from benchmarks.priced import nested; import sys; nested(int(sys.argv[1]), int(sys.argv[2]))"
 #: a pass that a process of its own makes
-PASS_PROGRAM = "from benchmarks.priced import passed; import sys; passed(int(sys.argv[1]), sys.argv[2])"
+PASS_PROGRAM = "from benchmarks.priced import passed; import sys; passed(*map(int, sys.argv[1:3]), sys.argv[3])"
 
 
 def engine(mounts: int, frame: int, candidates: str = "priced", iterations: int = 1000) -> Case:
@@ -138,7 +140,7 @@ def swing(dimension: int, law: dict[str, Any], points: tuple[int, int] = (400, 5
         "floor": {"line": {"from": [-1.0, *up[:-1], -1.2], "to": [2.0, *up[:-1], -1.0], "count": points[1]}},
     }
     if not flat:
-        count = [250, 200] if points == DENSE else [25, 20]
+        count = SIDES.get(points[1], [25, 20])
         grids["floor"] = {"plane": {"corner": [-1, -1, -1.2], "edges": [[3, 0, 0.1], [0, 2, 0]], "count": count}}
     push = [30.0, 4.0, 9.0][:dimension]
     scene = {
@@ -159,7 +161,7 @@ def swing(dimension: int, law: dict[str, Any], points: tuple[int, int] = (400, 5
         "design": {"initial": 0.01, "lower": 0},
         "objectives": {"G": {"response": {"acceleration": {"body": "arm", "at": [1.0, *up]}}, "over_time": "rms"}},
         "constraints": [{"volume": "all", "limit": 20}],
-        "solver": {} if points == DENSE else {"integrator": "runge_kutta", "step": 0.005},
+        "solver": {} if points in DENSE else {"integrator": "runge_kutta", "step": 0.005},
     }  # fmt: skip
     return read_case(json.dumps(scene))
 
@@ -171,6 +173,19 @@ LAWS: dict[str, dict[str, Any]] = {
     "cubic": {"type": "cubic", "stiffness": 300, "cubic": 5000},
     "props": {"type": "gap", "stiffness": 300, "gap": 0.03, "side": "compression"},
     "props, damped": {"type": "gap", "stiffness": 300, "gap": 0.03, "side": "compression", "damping": 5},
+}
+
+#: others with modes over whose candidates passes go
+MODES: dict[str, dict[str, Any]] = {
+    "crushed legs": {"type": "crush", "stiffness": 9000, "force": 40, "side": "compression"},
+    "curves": {"type": "curve", "curve": [[-0.5, -90], [-0.1, -30], [0, 0], [0.05, 10], [0.4, 140]]},
+    "actuators": {"type": "actuator", "proportional": 80, "derivative": 4, "target": -0.05, "limit": 6},
+    "formulas": {"type": "expression", "force": "k*max(x - g, 0) + c*xd", "parameters": {"k": 500, "g": 0.02, "c": 3}},
+}
+#: laws by whose candidates passes go, in a plane and in space
+PASSES: dict[int, tuple[str, ...]] = {
+    2: ("cubic", "props", *MODES),
+    3: ("props",),
 }
 
 
@@ -224,11 +239,11 @@ def prices() -> Table:
     )
 
 
-def passed(dimension: int, name: str) -> None:
-    """Go through all candidates of a dense scene and print what is told of it."""
+def passed(dimension: int, dense: int, name: str) -> None:
+    """Go through all candidates of a dense scene, of the number `dense` in DENSE, and print what is told of it."""
     import resource
 
-    case = swing(dimension, LAWS[name], DENSE)
+    case = swing(dimension, {**LAWS, **MODES}[name], DENSE[dense])
     (group,) = case.members
     assert group.candidates is not None
     chosen = np.sort(np.random.default_rng(1).choice(group.candidates.count, BUILT, replace=False))
@@ -253,22 +268,25 @@ def passed(dimension: int, name: str) -> None:
 
 
 def passes() -> Table:
-    """Passes over 1e8 candidates of scenes with a joint, each in a process of its own."""
+    """Passes over 1e6 to 1e8 candidates of scenes with a joint, each in a process of its own."""
     rows = []
     for dimension, where in ((2, "on a hinge"), (3, "on a ball joint, in space")):
-        for name in ("springs", "dampers", "cubic"):
-            done = subprocess.run(
-                [sys.executable, "-c", PASS_PROGRAM, str(dimension), name],
-                capture_output=True, text=True, check=True, cwd=Path(__file__).parents[1],
-            )  # fmt: skip
-            told = json.loads(done.stdout.splitlines()[-1])
+        for name in PASSES[dimension]:
+            told = []
+            for dense in range(len(DENSE)):
+                done = subprocess.run(
+                    [sys.executable, "-c", PASS_PROGRAM, str(dimension), str(dense), name],
+                    capture_output=True, text=True, check=True, cwd=Path(__file__).parents[1],
+                )  # fmt: skip
+                told.append(json.loads(done.stdout.splitlines()[-1]))
+            last = told[-1]
             rows.append([
-                f"{name} {where}", f"{told['candidates']:,}", str(told["states"]), f"{told['pass']:.1f} s",
-                f"{told['processor']:.1f} s", f"{1e9 * told['processor'] / told['candidates']:,.0f} ns",
-                f"{told['megabytes']:.0f} MB",
+                f"{name} {where}", str(last["states"]), *(f"{each['pass']:.2f} s" for each in told),
+                f"{last['processor']:.1f} s", f"{1e9 * last['processor'] / last['candidates']:,.0f} ns",
+                f"{last['megabytes']:.0f} MB",
             ])  # fmt: skip
-    columns = ["candidates", "of these", "states", "one pass", "its processor time", "of one", "memory"]
-    note = f"With {BUILT} members that are built. The states of the motion are those at which each price is a sum of."
+    columns = ["candidates", "states", "1e6", "1e7", "1e8", "processor time, 1e8", "of one", "memory"]
+    note = f"With {BUILT} members that are built. A price is a sum over the states of the motion."
     return Table("Passes over all candidates of a scene with a joint", columns, rows, (note,))
 
 

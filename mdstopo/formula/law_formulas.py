@@ -19,6 +19,7 @@ from mdstopo.formula.calculus import (
     simplified,
     substituted,
 )
+from mdstopo.formula.even import is_even
 from mdstopo.formula.idle import Idle, idle_sides
 from mdstopo.formula.parser import parse
 from mdstopo.formula.sharp import sharp_switches
@@ -65,7 +66,7 @@ class Program(NamedTuple):
     """Groups of formulas, and how many parameters and switches they have.
 
     idle: on which sides of switches force and energy are 0. sharp: the switches, as bits, at which slopes of the force
-    begin with a root.
+    begin with a root. even: see `even.is_even`.
     """
 
     groups: tuple[Group, ...]
@@ -73,6 +74,7 @@ class Program(NamedTuple):
     switches: int
     idle: tuple[Idle, ...]
     sharp: int
+    even: bool
 
     @property
     def has_timed_switches(self) -> bool:
@@ -168,7 +170,8 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
     by_time = derivative(f, "t")
     groups.append(group_of((by_time,), limited([(by_time, ONE)])))
     sharp = sharp_switches(f, [switch.margin for switch in found.switches], MOTION)
-    return Program(tuple(groups), len(names), len(found.switches), idle_sides((f, v), guards), sharp)
+    even = is_even((f, v), [switch.margin for switch in found.switches])
+    return Program(tuple(groups), len(names), len(found.switches), idle_sides((f, v), guards), sharp, even)
 
 
 def group_of(values: tuple[Expression, ...], guards: Iterable[Guard] = ()) -> Group:

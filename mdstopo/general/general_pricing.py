@@ -9,15 +9,30 @@ from mdstopo.case.laws import Law
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.compiler.threads import allowed
 from mdstopo.general import candidate_prices as kernels
-from mdstopo.general.candidate_prices import FIELDS, NODE, NODES
 from mdstopo.general.compile_general import GeneralScene
 from mdstopo.general.dimension import dimension_of, in_frame
 from mdstopo.general.extremes import COLUMNS, FRACTION, RATE, STEP
 from mdstopo.general.general_model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
+from mdstopo.general.priced_candidates import (
+    ARRAYS,
+    FIELDS,
+    FIRST_NODE,
+    FOLLOWED,
+    NODE,
+    NODES,
+    NONE,
+    PART,
+    PIECES,
+    POINT,
+    POWERS,
+    WHOLE,
+    PricedCandidates,
+)
 from mdstopo.general.pricing_states import OF_A_ROW, keep_states, states_of_sum
 from mdstopo.general.row_gradients import sign_of, wanted_rows
 from mdstopo.general.step_history import FIRST
 from mdstopo.general.variables import as_computed
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.laws.law_table import SPRING, kernels_of, may_switch
 from mdstopo.scene.bodies import stands_as
 from mdstopo.scene.origin import starting_places
@@ -95,15 +110,26 @@ def pricing_states_of(driver: "GeneralDriver", factor: FloatArray) -> PricingSta
     own = ScenePricingStates(
         driver.case, driver.scene, model, numbers, pose, change, pose_a, energy, when, segment, None
     )  # fmt: skip
-    if any(_switches(law) for group in driver.case.priced_groups for law in group.laws):
+    if any(_modes(law) == FOLLOWED for group in driver.case.priced_groups for law in group.laws):
         own = own._replace(steps=steps_of(driver, own, index, chosen.rows))
     return PricingStates((own,))
 
 
-def _switches(law: Law) -> bool:
-    """Whether members of a law have to be followed through their modes."""
+def _modes(law: Law) -> int:
+    """Which modes a law has for prices, of NONE, FOLLOWED and PIECES."""
     modes = kernels_of(type(law)).modes
-    return may_switch(law) and modes is not None and not modes.pieces
+    if modes is None or not may_switch(law):
+        return NONE
+    return PIECES if modes.pieces else FOLLOWED
+
+
+def _is_even(law: Law) -> bool:
+    """Whether prices of candidates near each other follow from few of them wherever their modes are the same."""
+    own = kernels_of(type(law))
+    # what members do is then a polynomial of their permanent sets, of the second degree
+    is_linear = own.modes is not None and own.modes.degree == 1
+    is_known = own.is_even is not None and own.is_even(law) and (own.permanent_set is None or is_linear)
+    return own.modes is None or is_known
 
 
 def _rows_of(driver: "GeneralDriver", factor: FloatArray) -> _Rows:
@@ -175,10 +201,10 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         return list(found.values())
 
     def error(self, states: PricingStates) -> float:
-        """See `CandidatePass.error`; 0 where a law has modes, or a formula that may be as sharp as these: a few
-        candidates in the middle of a tile can then go through a mode that none of those beside them do."""
+        """See `CandidatePass.error`; 0 where a law may be sharp at places of which bounds do not tell: a few candidates
+        in the middle of a tile can then do what none of those beside them does."""
         laws = (law for scene in states.scenes for place in self._places for law in scene.case.members[place].laws)
-        return 0.0 if any(kernels_of(type(law)).modes is not None for law in laws) else SMOOTH_ERROR
+        return SMOOTH_ERROR if all(_is_even(law) for law in laws) else 0.0
 
     def _packed_scene(self, states: PricingStates) -> tuple[IndexArray, FloatArray]:
         """A packed scene with room for the members of a tile, and for the numbers of any of the scenes' laws."""
@@ -190,7 +216,7 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             active=np.ones((segments, 1), dtype=np.int64),
             level=np.zeros((segments, 1, 2)),
             power=np.ones(1),
-            member=np.zeros((len(model.member), PLACES)),
+            member=np.zeros((len(model.member), 2 * PLACES)),
             curves=np.zeros(_most_curves(states)),
         )
         return pack_general(with_tile, scene.kinematics)
@@ -198,7 +224,7 @@ class GeneralCandidates(CandidatePass[PricingStates]):
     def _packed(
         self, states: PricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]
     ) -> tuple[IndexArray, FloatArray]:
-        """A packed `candidate_prices.PricedCandidates`; chosen: which points of both grids."""
+        """A packed `priced_candidates.PricedCandidates`; chosen: which points of both grids."""
         parts = [(scene, place) for scene in states.scenes for place in self._places]
         curves = np.zeros((len(parts), _most_curves(states)))
         points: list[list[FloatArray]] = []
@@ -209,11 +235,11 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             curves[number, : len(scene.model.curves)] = scene.model.curves
             points.append(self._points(scene, place, chosen))
             for run in _runs(scene, place):
-                code, before, from_start = run.row
+                code, before, from_start, modes = run.row
                 ends = state + len(run.when), step + len(run.step)
-                rows.append([number, code, state, state + before, ends[0], step, ends[1], from_start])
-                run.step[:, : kernels.FIRST_NODE] += state
-                run.step[:, kernels.FIRST_NODE] += node
+                rows.append([number, code, state, state + before, ends[0], step, ends[1], from_start, modes])
+                run.step[:, :FIRST_NODE] += state
+                run.step[:, FIRST_NODE] += node
                 runs.append(run)
                 (state, step), node = ends, node + len(run.node_pose)
         arrays: tuple[Any, ...] = (
@@ -221,11 +247,11 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             np.array([run.rest for run in runs]),
             np.array([run.law for run in runs]).reshape(len(runs), -1),
             curves,
-            *(np.concatenate([getattr(run, name) for run in runs]) for name in kernels.ARRAYS),
+            *(np.concatenate([getattr(run, name) for run in runs]) for name in ARRAYS),
             *(np.array(each) for each in zip(*points, strict=True)),
             *(each[k].T for each, k in zip(self.homes, chosen, strict=True)),
         )
-        return FIELDS.packed(kernels.PricedCandidates(*arrays))
+        return FIELDS.packed(PricedCandidates(*arrays))
 
     def _points(
         self, scene: ScenePricingStates, place: int, chosen: tuple[IndexArray | slice, IndexArray | slice]
@@ -254,13 +280,13 @@ class GeneralCandidates(CandidatePass[PricingStates]):
 
 
 class _Run(NamedTuple):
-    """A row of `candidate_prices.PricedCandidates.run` with its states, steps and nodes; each as there.
+    """A row of `priced_candidates.PricedCandidates.run` with its states, steps and nodes; each as there.
 
-    row: the law's code, how many states there are before the first one whose energy counts, and whether it acts from
-    the start.
+    row: the law's code, how many states there are before the first one whose energy counts, whether it acts from the
+    start, and which modes it has.
     """
 
-    row: tuple[int, int, int]
+    row: tuple[int, int, int, int]
     rest: float
     law: FloatArray
     pose: FloatArray
@@ -269,6 +295,7 @@ class _Run(NamedTuple):
     energy: FloatArray
     when: FloatArray
     level: FloatArray
+    frame: FloatArray
     step: IndexArray
     step_time: FloatArray
     node_pose: FloatArray
@@ -276,6 +303,7 @@ class _Run(NamedTuple):
     node_change: FloatArray
     node_level: FloatArray
     node_energy: FloatArray
+    node_frame: FloatArray
 
 
 def _runs(scene: ScenePricingStates, place: int) -> list[_Run]:
@@ -291,7 +319,8 @@ def _run_of(scene: ScenePricingStates, k: int, record: Law) -> _Run:
     free, code = getattr(record, "free_length", None), int(model.block[k, CODE])
     moves, stores = scene.change[:, pair].any(axis=1), scene.energy != 0.0
     acts = (scene.segment >= 0) & (model.active[scene.segment, k] != 0)
-    steps = scene.steps if _switches(record) else None
+    modes = _modes(record)
+    steps = scene.steps if modes == FOLLOWED else None
     before = 0
     if steps is not None:
         states = np.arange(len(scene.when))
@@ -304,12 +333,24 @@ def _run_of(scene: ScenePricingStates, k: int, record: Law) -> _Run:
     change = scene.change[states, pair]
     change[before if before else len(change) :] = 0.0
     level = _level(model, k, scene.segment[states], scene.when[states])
-    parts = _no_steps(scene.pose.shape[2], change.shape[1]) if steps is None else _steps_of_law(steps, model, k, pair)
+    pose, kinematics = scene.pose[states, pair], scene.scene.kinematics
+    frame = _frames(kinematics, pose)
+    if steps is None:
+        parts = _no_steps(pose.shape[1], change.shape[1], frame.shape[1])
+    else:
+        parts = _steps_of_law(steps, model, k, pair, kinematics)
     return _Run(
-        (code, before, int(model.active[0, k])), -1.0 if free is None else float(free), model.law[k],
-        scene.pose[states, pair][:, None], change[:, None], scene.pose_a[states, pair], scene.energy[states],
-        scene.when[states], level, *parts,
+        (code, before, int(model.active[0, k]), modes), -1.0 if free is None else float(free), model.law[k],
+        pose[:, None], change[:, None], scene.pose_a[states, pair], scene.energy[states],
+        scene.when[states], level, frame if modes != NONE else np.zeros_like(frame), *parts,
     )  # fmt: skip
+
+
+def _frames(kinematics: Kinematics, poses: FloatArray) -> FloatArray:
+    """How ends of members move at relative poses (n, POSE), (n, n_frame): d, S, d', S' of `Kinematics.ends`, and the
+    norm of S'."""
+    place, turn, speed, spin = (each.reshape(len(poses), np.prod(each.shape[1:])) for each in kinematics.ends(poses))
+    return np.hstack([place, turn, speed, spin, np.linalg.norm(spin, axis=1)[:, None]])
 
 
 def _level(model: GeneralModel, k: int, segment: IndexArray, when: FloatArray) -> FloatArray:
@@ -322,7 +363,7 @@ def _level(model: GeneralModel, k: int, segment: IndexArray, when: FloatArray) -
 class Steps(NamedTuple):
     """The steps of a motion, in the order in which members that switch go through them, each with its nodes.
 
-    step (K, 5), step_time (K, 2): as of `candidate_prices.PricedCandidates`. segment (K,): in which each is.
+    step (K, 5), step_time (K, 2): as of `priced_candidates.PricedCandidates`. segment (K,): in which each is.
     pose (nodes, G, POSE), pose_a, change (nodes, G, D), energy (nodes,): at the nodes.
     """
 
@@ -344,7 +385,7 @@ def steps_of(driver: "GeneralDriver", states: ScenePricingStates, index: IndexAr
     found: list[tuple[tuple[float, int, int, int], list[int], tuple[float, float], tuple[int, float]]] = []
     for w in range(count):
         stages = [int(index[w, FIRST]), int(index[w + 1, FIRST])]
-        found.append(((t[w], 3, 0, 0), [*stages, kernels.WHOLE], (t[w], t[w + 1] - t[w]), (w, 1.0)))
+        found.append(((t[w], 3, 0, 0), [*stages, WHOLE], (t[w], t[w + 1] - t[w]), (w, 1.0)))
     for m, row in enumerate(rows):
         k, c, at = int(row[STEP]), float(row[FRACTION]), int(index[count, FIRST]) + OF_A_ROW * m
         used = int((states.segment[at + 1 : at + OF_A_ROW] >= 0).sum())
@@ -352,9 +393,9 @@ def steps_of(driver: "GeneralDriver", states: ScenePricingStates, index: IndexAr
         inside = 0.0 < c < 1.0
         if used:
             stages = [at + 1, at + 1 + used]
-            found.append(((begin, 1, m, 0), [*stages, kernels.PART], (begin, c * length), (k, c)))
+            found.append(((begin, 1, m, 0), [*stages, PART], (begin, c * length), (k, c)))
         key = (begin, 1, m, 1) if used else (begin, 4, m, 0) if inside else (begin + max(c, 0.0) * length, 0, m, 0)
-        found.append((key, [at, at + 1, kernels.POINT], (begin + c * length, 0.0), (k, c)))
+        found.append((key, [at, at + 1, POINT], (begin + c * length, 0.0), (k, c)))
     found.sort(key=lambda each: each[0])
     moves = states.change.any(axis=(1, 2)) | (states.energy != 0.0)
     step = [
@@ -395,22 +436,25 @@ def _between_stages(values: FloatArray, when: FloatArray, stages: slice, begin: 
     return found
 
 
-def _steps_of_law(steps: Steps, model: GeneralModel, k: int, pair: int) -> tuple[Any, ...]:
+def _steps_of_law(steps: Steps, model: GeneralModel, k: int, pair: int, kinematics: Kinematics) -> tuple[Any, ...]:
     """The steps in which the law of block k acts, with their nodes, as of `_Run`."""
     acts = model.active[steps.segment, k] != 0
     nodes = np.flatnonzero(np.repeat(acts, NODES))
     step = steps.step[acts].copy()
-    step[:, kernels.FIRST_NODE] = NODES * np.arange(len(step))
+    step[:, FIRST_NODE] = NODES * np.arange(len(step))
     time = steps.step_time[acts]
     when = (time[:, :1] + time[:, 1:] * NODE).ravel()
     level = _level(model, k, np.repeat(steps.segment[acts], NODES), when)
-    kept = steps.pose[nodes, pair], steps.pose_a[nodes, pair], steps.change[nodes, pair]
-    return step, time, *kept, level, steps.energy[nodes]
+    pose = steps.pose[nodes, pair]
+    kept = pose, steps.pose_a[nodes, pair], steps.change[nodes, pair]
+    by_powers = ((values.reshape(-1, NODES) @ POWERS.T).ravel() for values in (level, steps.energy[nodes]))
+    return step, time, *kept, *by_powers, _frames(kinematics, pose)
 
 
-def _no_steps(pose: int, freedoms: int) -> tuple[Any, ...]:
-    """No steps and nodes, as of `_Run`; pose, freedoms: numbers of a pose and of its change."""
-    nodes = np.zeros((0, pose)), np.zeros((0, freedoms)), np.zeros((0, freedoms)), np.zeros(0), np.zeros(0)
+def _no_steps(pose: int, freedoms: int, frame: int) -> tuple[Any, ...]:
+    """No steps and nodes, as of `_Run`; pose, freedoms, frame: numbers of a pose, of its change and of a frame."""
+    motion = np.zeros((0, pose)), np.zeros((0, freedoms)), np.zeros((0, freedoms))
+    nodes = *motion, np.zeros(0), np.zeros(0), np.zeros((0, frame))
     return np.zeros((0, 5), dtype=np.int64), np.zeros((0, 2)), *nodes
 
 

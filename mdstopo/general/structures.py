@@ -21,10 +21,10 @@ def __getattr__(name: str) -> type:
     if name.endswith(_ENDING) and name not in _KINDS:
         from mdstopo.general import (  # noqa: F401 (which have them)
             accelerations,
-            candidate_prices,
             dense_output,
             gauss_window,
             general_model,
+            priced_candidates,
             step_history,
         )
 

@@ -131,6 +131,19 @@ def begin_tile(error, scratch):
 
 
 @kernel
+def begin_part(level, at, scratch):
+    """Begin a part of a tile, which has so many columns as the level says: the others have their prices.
+
+    level, at: its level, and the number of its first column. scratch: of `make_scratch`; plan and level are set.
+    """
+    plan, own = scratch[:2]
+    plan[:] = 0
+    plan[LEVEL] = level
+    own[:] = DONE
+    _put_off(own, at // SHORT, BROAD >> level, level)
+
+
+@kernel
 def next_candidates(grids, i, j, scratch):
     """The next candidates of a tile whose prices are wanted, each of some rows with each of some columns.
 
@@ -197,6 +210,24 @@ def next_candidates(grids, i, j, scratch):
     for k in range(height):
         rows[k] = k
     return True
+
+
+@kernel
+def number_candidates(i, j, scratch):
+    """The numbers of the points of the candidates that `next_candidates` has told.
+
+    i, j: the tile.
+    scratch: of `make_scratch`, of which index is set, row by row.
+
+    Returns how many there are.
+    """
+    plan, _, rows, columns, index, _, _ = scratch
+    wide = plan[COLUMNS]
+    for a in range(plan[ROWS]):
+        for b in range(wide):
+            index[0, a * wide + b] = i * TALL + rows[a]
+            index[1, a * wide + b] = j * BROAD + columns[b]
+    return plan[ROWS] * wide
 
 
 @part

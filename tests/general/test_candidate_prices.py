@@ -4,13 +4,17 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mdstopo.case import candidates
 from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
+from mdstopo.sensitivity.springs_candidate_prices import ERROR
 from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
 from tests.sensitivity.test_candidate_prices import assert_dense_pass_is_right
+from tests.tiers import examples
 
 #: relative to the largest
 AGREE = 1e-10
@@ -322,6 +326,138 @@ def test_a_dense_pass_computes_few_of_the_prices_and_knows_all(law):
     assert_dense_pass_is_right(candidates, states, np.abs(sample).max(), 1e-12)
 
 
+#: laws with modes, some of which members of a dense tile go through in a step, and others do not
+DENSE = {
+    "slack": {"type": "gap", "stiffness": 900, "gap": 0.005, "side": "compression"},
+    "damped and clipped": {
+        "type": "gap",
+        "stiffness": 900,
+        "gap": 0.005,
+        "side": "compression",
+        "damping": 30,
+        "clip": True,
+    },
+    "crushed": {"type": "crush", "stiffness": 9000, "force": 20},
+    "curve": CURVE,
+    "steered": {"type": "actuator", "proportional": 80, "derivative": 4, "target": -0.05, "limit": 6},
+    "formula": {"type": "expression", "force": "-900*max(-x - 0.005, 0) + 3*xd"},
+    "several": [*SEVERAL, {"type": "gap", "stiffness": 300, "gap": 0.005, "side": "compression", "free_length": 0.8}],
+}
+
+
+def dense(scene, width=0.002):
+    """The points of both grids lie as near each other as in a tile of 1e8 candidates."""
+    for name, count, begin, end in (
+        ("p", BROAD, [0.9, -0.3], [0.9 + width, -0.3 - width]),
+        ("q", 2 * TALL, [1.2, -1.1], [1.2 + width, -1.1]),
+    ):
+        line = {"from": begin, "to": end, "count": count}
+        if scene.get("dimension") == 3:
+            at = {"p": [0.1, 0.1, 0.9], "q": [0.6, -0.4, 0]}[name]
+            line = {
+                "from": at,
+                "to": np.add(at, [width, 0.5 * width, width * (name == "p")]).tolist(),
+                "count": count,
+            }
+        scene["points"][name]["grid"] = {"line": line}
+    return scene
+
+
+def assert_dense(scene, alpha=0.2):
+    """A pass over a dense scene knows all prices, and computes few."""
+    candidates, states = states_of(dense(scene), alpha)
+    rows, columns = len(candidates.homes[0]), len(candidates.homes[1])
+    sample = candidates.prices_between(states, *np.divmod(np.arange(0, rows * columns, 7), columns))
+    assert_dense_pass_is_right(candidates, states, np.abs(sample).max(), 1e-12)
+
+
+@pytest.mark.parametrize("name", DENSE)
+def test_a_dense_pass_by_laws_with_modes_computes_few_of_the_prices_and_knows_all(name):
+    assert_dense(arm(DENSE[name], **ENERGY) if name == "crushed" else arm(DENSE[name]))
+
+
+def test_a_dense_pass_by_laws_with_modes_knows_all_load_cases():
+    assert_dense(arm(DENSE["slack"], **TWICE))
+
+
+@pytest.mark.parametrize("name", ["slack", "crushed", "curve"])
+def test_a_dense_pass_in_space_by_laws_with_modes_computes_few_of_the_prices(name):
+    assert_dense(in_space(DENSE[name], **ENERGY))
+
+
+def test_a_dense_pass_by_laws_with_modes_knows_mirror_images():
+    scene = dense(arm(DENSE["slack"]))
+    for name in ("p", "q"):
+        ends = {end: np.array(scene["points"][name]["grid"]["line"][end]) for end in ("from", "to")}
+        line = {end: (at - [0.05, 0.02]).tolist() for end, at in ends.items()} | {
+            "count": {"p": BROAD, "q": 2 * TALL}[name]
+        }
+        scene["points"][f"{name}2"] = {"body": scene["points"][name]["body"], "grid": {"line": line}}
+    scene["members"]["web"]["cost"] = 1
+    scene["members"]["image"] = {**scene["members"]["web"], "from": "p2", "to": "q2"}
+    scene["design"]["mirrored"] = [["web", "image"]]
+    candidates, states = images_of(scene, 0.2)
+    sample = candidates.prices(states, *np.divmod(np.arange(0, BROAD * 2 * TALL, 7), 2 * TALL))
+    assert_dense_pass_is_right(candidates, states, np.abs(sample).max(), 1e-12)
+
+
+def images_of(scene, alpha):
+    """What `states_of` tells of a scene with mirrored groups."""
+    case = read_case(json.dumps({"format": 1, **scene, "solver": {"step": STEP, "integrator": "runge_kutta"}}))
+    evaluator = Evaluator(case)
+    problem = evaluator.problem()
+    evaluation = problem.evaluation(np.full(case.space.size, alpha))
+    states = problem.pricing_states(evaluation, np.ones(len(problem.sample_of(evaluation).rows)))
+    return evaluator.candidates_of(case.members[0]), states
+
+
+def random_law(rng):
+    """A law with modes, with random numbers."""
+    kind = rng.choice(["gap", "crush", "curve", "actuator", "expression"])
+    side = {"side": str(rng.choice(["tension", "compression"]))}
+    later = {"active_from": float(rng.uniform(0.02, 0.2))} if rng.random() < 0.3 else {}
+    if kind == "gap":
+        damped = {"damping": float(rng.uniform(1, 20)), "clip": bool(rng.random() < 0.5)} if rng.random() < 0.5 else {}
+        own = {"stiffness": float(rng.uniform(100, 2000)), "gap": float(rng.uniform(-0.05, 0.1)), **side, **damped}
+    elif kind == "crush":
+        own = {"stiffness": float(rng.uniform(1e3, 9e3)), "force": float(rng.uniform(3, 60)), **side}
+    elif kind == "curve":
+        knots = np.sort(rng.uniform(-0.3, 0.4, int(rng.integers(3, 7))))
+        own = {"curve": np.stack([knots, np.sort(rng.uniform(-90, 140, len(knots)))], axis=1).tolist()}
+    elif kind == "actuator":
+        own = {"proportional": float(rng.uniform(20, 300)), "derivative": 3.0, "target": -0.05, "limit": 7.0}
+    else:
+        numbers = {"k": 500.0, "g": float(rng.uniform(-0.02, 0.1)), "c": 3.0}
+        own = {"force": "k*max(x - g, 0) + c*xd*step(x - g)", "parameters": numbers}
+    return {"type": str(kind), **own, **later}
+
+
+@settings(max_examples=examples(10, 80), derandomize=True, deadline=None)
+@given(st.integers(0, 10**6))
+def test_passes_over_random_tiles_know_what_each_of_their_candidates_is_worth(seed):
+    rng = np.random.default_rng(seed)
+    looks = [ENERGY, looked("energy", "mean"), looked(PULL, "max"), looked(PUSH, "rms"), STOP, {}]
+    scene = dense(arm(random_law(rng), **looks[rng.integers(len(looks))]), 10.0 ** rng.uniform(-2.5, -0.5))
+    candidates, states = states_of(scene, 0.2)
+    common = candidates.common(states, 0.0)
+    every = np.arange(candidates.shape[0] * candidates.shape[1])
+    _, found = candidates.tiles(states, common, every, True)
+    error, common[ERROR] = common[ERROR], 0.0
+    _, exact = candidates.tiles(states, common, every, True)
+    there = np.isfinite(exact)
+    assert np.array_equal(there, np.isfinite(found))
+    # where nothing is worth anything, prices are rounding
+    assert np.abs(found[there] - exact[there]).max() <= 5.0 * max(error, 1e-12 * np.abs(exact[there]).max(), 1e-20)
+
+
+def test_formulas_that_may_be_sharp_anywhere_are_priced_one_by_one():
+    scene = dense(arm({"type": "expression", "force": "90*tanh(x/0.001)"}))
+    candidates, states = states_of(scene, 0.2)
+    assert candidates.common(states, 0.0)[ERROR] == 0.0
+    smooth, states = states_of(dense(arm(FORMULA)), 0.2)
+    assert smooth.common(states, 0.0)[ERROR] > 0.0
+
+
 def states_of(scene, alpha, **solver):
     """The candidates of a scene's first group, and what the rows ask of them where all members have that alpha."""
     solver = solver or {"step": STEP, "integrator": "runge_kutta"}
@@ -399,13 +535,8 @@ def test_a_dense_pass_knows_the_points_of_mirror_images():
     scene["members"]["web"]["cost"] = 1
     scene["members"]["image"] = {**scene["members"]["web"], "from": "p2", "to": "q2"}
     scene["design"]["mirrored"] = [["web", "image"]]
-    case = read_case(json.dumps({"format": 1, **scene, "solver": {"step": STEP, "integrator": "runge_kutta"}}))
-    evaluator = Evaluator(case)
-    problem = evaluator.problem()
-    evaluation = problem.evaluation(np.full(case.space.size, 0.2))
-    states = problem.pricing_states(evaluation, np.ones(len(problem.sample_of(evaluation).rows)))
-    candidates = evaluator.candidates_of(case.members[0])
-    sample = candidates.prices(states, *np.divmod(np.arange(case.members[0].candidates.count), 2 * TALL))
+    candidates, states = images_of(scene, 0.2)
+    sample = candidates.prices(states, *np.divmod(np.arange(BROAD * 2 * TALL), 2 * TALL))
     assert_dense_pass_is_right(candidates, states, np.abs(sample).max(), 1e-12)
 
 

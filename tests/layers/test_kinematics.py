@@ -30,8 +30,7 @@ STRIDE = re.compile(
 #: lines that look like one and are none: where, what stands there, and what it is
 NO_STRIDES = {
     ("accelerations.py", "3 * model.size[1] + 1"): "a banded matrix with room for its pivots",
-    ("candidate_prices.py", "range(3)"): "names of columns",
-    ("candidate_prices.py", "range(6)"): "names of columns",
+    ("priced_candidates.py", "range(3)"): "what a law's modes are, and what a step is",
     ("compile_general.py", "reshape(-1, 6)"): "columns of a response",
     ("general_driver.py", "np.zeros((1, 3))"): "a response, its rate and its member",
     ("general_driver.py", "reshape(events, 6)"): "columns of an event",

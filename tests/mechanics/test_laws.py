@@ -22,6 +22,7 @@ from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import (
     LAWS,
     ActuatorLaw,
+    CrushLaw,
     CubicLaw,
     CurveLaw,
     GapLaw,
@@ -540,6 +541,49 @@ def test_from_any_mode_two_switches_lead_to_the_right_one(kind, seed):
             if kernel.margin(x, xd, mode) < 0.0:
                 mode = kernel.next(x, xd, xdd, mode)
         assert {mode} == right_modes(kernel.record, x, xd)
+
+
+def with_modes(kind, rng):
+    """A law of a kind with its modes."""
+    if kind != "crush":
+        kernel = Kernel(MAKERS[kind](rng))
+        return kernel, kernel.modes
+    return Kernel(CrushLaw(stiffness=size(rng), force=size(rng), gap=signed(rng, 0.5))), (0, 1, 2)
+
+
+#: what prices of candidates ask of laws with modes
+every_even = pytest.mark.parametrize("kind", [*SWITCHING, "crush"])
+
+
+@every_even
+@many
+@given(seeds)
+def test_over_ranges_of_elongation_and_rate_a_margin_is_least_at_a_corner(kind, seed):
+    rng = np.random.default_rng(seed)
+    kernel, modes = with_modes(kind, rng)
+    assert law_table.kernels_of(type(kernel.record)).is_even(kernel.record)
+    x, xd = (np.sort(rng.uniform(-3.0, 3.0, 2)) for _ in range(2))
+    for mode in modes:
+        least = min(kernel.margin(a, b, mode) for a in x for b in xd)
+        for a, b in zip(rng.uniform(*x, 9), rng.uniform(*xd, 9), strict=True):
+            assert kernel.margin(a, b, mode) >= least - 1e-12 * max(abs(least), 1.0)
+
+
+@every_even
+@many
+@given(seeds)
+def test_in_a_mode_force_and_energy_are_polynomials_of_their_degree(kind, seed):
+    rng = np.random.default_rng(seed)
+    kernel, modes = with_modes(kind, rng)
+    degree = law_table.kernels_of(type(kernel.record)).modes.degree
+    x = signed(rng) + np.linspace(-0.5, 0.5, 7)
+    for mode in modes:
+        f, _, f_xd, v, _ = np.array([kernel.at(each, 0.0, mode) for each in x]).T
+        for values, order in ((f, degree), (v, degree + 1)):
+            assert np.abs(np.diff(values, order + 1)).max() <= 1e-11 * max(np.abs(values).max(), 1.0)
+        xd = signed(rng)
+        moving = np.array([kernel.at(each, xd, mode)[0] for each in x])
+        assert moving == pytest.approx(f + f_xd[0] * xd, rel=1e-11, abs=1e-11)
 
 
 @every_gap

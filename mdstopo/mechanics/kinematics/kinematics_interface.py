@@ -29,6 +29,9 @@ from mdstopo.compiler.kernel import Kernel
 
 #: what a joint transmits (`transmitted`)
 FORCE, MOMENT, ACROSS_FORCE = range(3)
+#: rows of `member_works`
+ELONGATION, RATE, ALONG, INVERSE = range(4)
+WORKS = 4
 
 #: by the name of the model's type
 _MOVED_BY: dict[str, "Kinematics"] = {}
@@ -42,7 +45,9 @@ class Kinematics:
 
     coordinates, freedoms, rotations, attitude: N, D, T, A of a body. rows: the most rows of a joint. at_home (N): the
     coordinates of a body that has not moved. kernels: a function for each of this module, without those that only
-    bodies of another kind have (`OPTIONAL`). entries: the module of those that Python calls (`planar_entry`).
+    bodies of another kind have (`OPTIONAL`). entries: the module of those that Python calls (`planar_entry`). ends: of
+    relative poses (n, POSE) the places d (n, axes), turns S (n, axes, axes), and their rates by time d', S', with which
+    the vector from a point p of the first body to a point q of the second is d + S q - p.
     """
 
     coordinates: int
@@ -53,6 +58,7 @@ class Kinematics:
     at_home: tuple[float, ...]
     kernels: Mapping[str, Kernel]
     entries: str
+    ends: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray, FloatArray]]
 
     @property
     def turns_couple(self) -> bool:
@@ -934,6 +940,21 @@ def spring_sums_at_poses(model, p, start, count, row, counted, member_state, rel
       pair, poses: number of the pair, and how many poses.
     Out:
       sums (poses or more, n_pair, SUMS): added to.
+    """
+    raise NotImplementedError
+
+
+def member_works(model, lo, count, r, u, out):
+    """What `member_motion` and `member_work` say of many members, in vectors.
+
+    In:
+      model: the compiled scene.
+      lo, count: the first member (padded), and how many there are.
+      r (POSE,): relative pose of the pair.
+      u (D,): change of the pose.
+    Out:
+      out (WORKS, count or more): elongations (m), their rates (m/s), how fast they change along u, and 1 / L (1/m),
+        which is 0 where there is no length; whole vectors, of which what is behind the last member means nothing.
     """
     raise NotImplementedError
 

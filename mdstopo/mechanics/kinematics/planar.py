@@ -46,6 +46,7 @@ from mdstopo.mechanics.kinematics.planar_poses import (
     VT,
     VX,
     VY,
+    ends,
     fill_pose,
     small_turn,
     turned_from,
@@ -456,7 +457,7 @@ _KERNELS = (
     planar_members.end_slopes, planar_inerters.inerter_row, planar_inerters.add_inerter_tangents,
     planar_members.keep_apart,
     planar_members.ends_meet, planar_members.member_sums, planar_members.spring_sums,
-    planar_members.spring_sums_at_poses, planar_members.member_designs,
+    planar_members.spring_sums_at_poses, planar_members.member_works, planar_members.member_designs,
     planar_members.spring_designs, planar_members.has_spring_energies,
     planar_members.spring_energies, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
     place_joint, place_joint_alone, joint_rows, joint_gamma, joint_velocity_slope, joint_acceleration_slopes,
@@ -476,5 +477,6 @@ PLANAR = Kinematics(
     rows=ROWS,
     at_home=(0.0,) * COORDINATES,
     entries="mdstopo.mechanics.kinematics.planar_entry",
+    ends=ends,
     kernels={each.__name__: cast(Kernel, each) for each in _KERNELS},
 )

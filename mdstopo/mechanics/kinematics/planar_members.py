@@ -22,6 +22,7 @@ from mdstopo.mechanics.laws.alike import (
     alike_designs,
     alike_sums,
     alike_tangent,
+    alike_works,
     elastic_designs,
     elastic_designs_of_rows,
     far,
@@ -244,6 +245,13 @@ def _springs_of_no_grid(rows, width, scale, start, stop, p, r, counted, tangent,
     else:
         x, y, t, e = elastic_force(rows, width, scale, start, stop, r, np.bool_(True))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
+
+
+@part
+def member_works(model, lo, count, r, u, out):
+    """What many members do at a relative pose; see `kinematics_interface.member_works`."""
+    m = model.member
+    alike_works(m.reshape(m.size), m.shape[1], lo, lo + whole_vectors(count), r, u, out)
 
 
 @kernel

@@ -12,6 +12,9 @@ digits of members that hardly stretch.
 
 import math
 
+import numpy as np
+
+from mdstopo.compiler.fields import FloatArray
 from mdstopo.compiler.jit import part
 from mdstopo.scene.springs_model import HOME_COS, HOME_SIN, HOME_X, HOME_Y
 
@@ -169,3 +172,10 @@ def add_pair_force(pair, rel, p, qx, qy, qt, out):
     out[a] -= fx
     out[a + 1] -= fy
     out[a + 2] += qx * rel[p, DY] - qy * rel[p, DX] - qt
+
+
+def ends(poses: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Places, turns and their rates of relative poses (n, POSE); see `kinematics_interface.Kinematics`."""
+    turn = np.stack([poses[:, [COS, SIN]], poses[:, [SIN, COS]] * [-1.0, 1.0]], axis=2)
+    quarter = np.stack([-turn[:, 1], turn[:, 0]], axis=1)
+    return poses[:, [DX, DY]], turn, poses[:, [VX, VY]], poses[:, VT, None, None] * quarter

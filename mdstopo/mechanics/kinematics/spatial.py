@@ -123,7 +123,7 @@ _KERNELS = (
     spatial_members.member_rows, spatial_members.end_slopes, spatial_members.inerter_row,
     spatial_members.add_inerter_tangents,
     spatial_members.keep_apart, spatial_members.ends_meet, spatial_members.member_sums, spatial_members.spring_sums,
-    spatial_members.spring_sums_at_poses,
+    spatial_members.spring_sums_at_poses, spatial_members.member_works,
     spatial_members.member_designs, spatial_members.spring_designs, spatial_members.has_spring_energies,
     spatial_members.spring_energies, spatial_members.spring_designs_of_rows,
     spatial_members.member_designs_of_rows,
@@ -177,5 +177,6 @@ SPATIAL = SpatialKinematics(
     rows=spatial_joints.ROWS,
     at_home=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
     entries="mdstopo.mechanics.kinematics.spatial_joints",
+    ends=spatial_poses.ends,
     kernels={each.__name__: cast(Kernel, each) for each in _KERNELS},
 )

@@ -61,6 +61,7 @@ from mdstopo.mechanics.kinematics.spatial_springs import (
     alike_damping,
     alike_sums,
     alike_tangent,
+    alike_works,
     elastic_designs,
     elastic_energies,
     far,
@@ -256,6 +257,13 @@ def spring_sums_at_poses(model, p, start, count, row, counted, member_state, rel
                 alike_tangent(rows, width, scale, start, stop, p, r, o)
         if tangent and p[1] != 0.0:
             alike_damping(rows, width, scale, start, stop, p, r, o)
+
+
+@part
+def member_works(model, lo, count, r, u, out):
+    """What many members do at a relative pose; see `kinematics_interface.member_works`."""
+    m = model.member
+    alike_works(m.reshape(m.size), m.shape[1], lo, lo + whole_vectors(count), r, u, out)
 
 
 @kernel

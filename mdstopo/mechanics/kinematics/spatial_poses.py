@@ -11,6 +11,9 @@ What has changed since home is found without forming the difference of two poses
 that hardly stretch.
 """
 
+import numpy as np
+
+from mdstopo.compiler.fields import FloatArray
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.kinematics.vectors import (
     add,
@@ -202,3 +205,10 @@ def deflection_of(r, r0, reach):
 def axis_of(model, body, k):
     """Axis k of a body as the case has it, in its principal axes."""
     return row_of(model.home[body], HOME_AXES, k)
+
+
+def ends(poses: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Places, turns and their rates of relative poses (n, POSE); see `kinematics_interface.Kinematics`."""
+    turn = poses[:, S : S + 9].reshape(-1, 3, 3)
+    rate = np.cross(poses[:, W : W + 3, None], turn, axis=1)
+    return poses[:, D : D + 3], turn, poses[:, D_RATE : D_RATE + 3], rate

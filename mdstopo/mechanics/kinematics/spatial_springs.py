@@ -268,6 +268,25 @@ def alike_damping(member, width, scale, start, stop, p, r, o):
 
 
 @kernel
+def alike_works(member, width, start, stop, r, u, out):
+    """Write down what members do at a relative pose.
+
+    In:
+      member, width, start, stop, r: as above.
+      u (FREEDOMS,): change of the pose.
+    Out:
+      out (4, stop - start or more): Delta, its rate, b . u, 1 / L.
+    """
+    for i in range(start, stop, lanes()):
+        arm, x, _, y, stretch = _seen_at(member, width, i, r)
+        n, rate = _rate(x, y, arm, r)
+        store(out[0], i - start, stretch)
+        store(out[1], i - start, rate)
+        store(out[2], i - start, dot(n, plus(vector_at(u, 0), cross(vector_at(u, 3), arm))))
+        store(out[3], i - start, y)
+
+
+@kernel
 def elastic_designs(member, width, start, stop, k, rel, u, pair, out):
     """Add sum_j f (b . u_j) over S poses of each spring, without damping and preload, at alpha^mu = 1.
 

@@ -6,7 +6,7 @@ Modes: linear, held at +limit, held at -limit.
 import numpy as np
 
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes
+from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, always
 
 LINEAR, UPPER, LOWER = range(3)
 
@@ -118,5 +118,7 @@ KERNELS = LawKernels(
         next_mode=actuator_next,
         first_mode=actuator_start,
         switches=actuator_switches,
+        degree=1,
     ),
+    is_even=always,
 )

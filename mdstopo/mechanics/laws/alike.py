@@ -211,6 +211,27 @@ def alike_design(member, width, start, stop, p, r, u, weight, out):
 
 
 @kernel
+def alike_works(member, width, start, stop, r, u, out):
+    """Write down what members do at a relative pose.
+
+    In:
+      member (6 M,): rows of `spring` of all members behind each other.
+      width: of a row, M.
+      start, stop: the members; padding in between becomes something that nobody reads.
+      r (POSE,): relative pose.
+      u (3,): change of it.
+    Out:
+      out (4, stop - start or more): Delta, its rate, b . u, 1 / L.
+    """
+    for i in range(start, stop, lanes()):
+        _, _, y, bx, by, bt, x = _seen(member, width, i, r)
+        store(out[0], i - start, x)
+        store(out[1], i - start, bx * r[4] + by * r[5] + bt * r[6])
+        store(out[2], i - start, bx * u[0] + by * u[1] + bt * u[2])
+        store(out[3], i - start, y)
+
+
+@kernel
 def elastic_designs(member, width, start, stop, k, rel, u, p, out):
     """Add sum_j f (b . u_j) over S poses of each member, without damping and preload, at alpha^mu = 1.
 

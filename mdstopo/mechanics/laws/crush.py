@@ -7,7 +7,7 @@ grows with its elongation; it is written down when crushing ends, where y is F /
 """
 
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, PermanentSet
+from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, PermanentSet, always
 
 OPEN, ELASTIC, CRUSHING = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide
@@ -156,6 +156,7 @@ KERNELS = LawKernels(
         first_mode=crush_start,
         idle=crush_idle,
         grazes=crush_grazes,
+        degree=1,
     ),
     permanent_set=PermanentSet(
         growth=crush_set,
@@ -164,4 +165,5 @@ KERNELS = LawKernels(
         slope=crush_set_slope,
         divides=crush_divides,
     ),
+    is_even=always,
 )

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.case.laws import CurveLaw
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes
+from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, always
 
 #: how far a piece goes on beyond its ends, relative to the narrowest: what rests on a knot does not change its mode by
 #: rounding, and the force is off by no more than the square of it
@@ -128,6 +128,8 @@ KERNELS = LawKernels(
         next_mode=curve_piece,
         first_mode=curve_start,
         pieces=True,
+        degree=3,
     ),
     data=curve_data,
+    is_even=always,
 )

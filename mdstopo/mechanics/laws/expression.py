@@ -50,6 +50,11 @@ def expression_is_watched(record: OfFormulas) -> bool:
     return record.program.has_curved_switches
 
 
+def expression_is_even(record: OfFormulas) -> bool:
+    """Whether formulas are polynomials of elongation and rate, or roots of what is linear, with linear switches."""
+    return record.program.even
+
+
 @inline
 def expression_force(p, x, xd, mode, t, curves, l0):
     """Force and its slopes by x and xd, energy and its slope by x: f, f_x, f_xd, V, V_x.
@@ -444,6 +449,7 @@ def expression_grazes(p, x, mode, t, curves, l0):
 KERNELS = LawKernels(
     is_smooth=expression_is_smooth,
     is_watched=expression_is_watched,
+    is_even=expression_is_even,
     force=expression_force,
     slopes=expression_slopes,
     rest_slopes=expression_rest_slopes,

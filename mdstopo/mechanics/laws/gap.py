@@ -6,7 +6,7 @@ clip holds at zero, because damping would reverse it. In each mode the formula g
 """
 
 from mdstopo.compiler.jit import inline
-from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes
+from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, always
 
 OPEN, CLOSED, CLIPPED = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide
@@ -165,5 +165,7 @@ KERNELS = LawKernels(
         first_mode=gap_start,
         idle=gap_idle,
         grazes=gap_grazes,
+        degree=1,
     ),
+    is_even=always,
 )

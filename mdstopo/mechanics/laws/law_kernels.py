@@ -43,6 +43,8 @@ class Modes:
     the force 1, the motion 2; None where it is always 0.
     sharp (p, x, xd, mode, t, curves, l0): whether slopes of the force begin with a root at the end of a mode that is
     nearest, so that steps beside it have to be short; None where that is true of none.
+    degree: of a law whose force in a mode is a polynomial in x of this degree at most, and a constant times xd, and
+    whose energy is one in x of the next degree: 1 to 3; None where that is not so, or not known.
     pieces: whether modes are pieces of one function that is smooth enough for motion and derivatives, so that only the
     accuracy of steps gains where they end at the end of a mode.
     """
@@ -60,6 +62,7 @@ class Modes:
     idle: Function | None = None
     grazes: Function | None = None
     sharp: Function | None = None
+    degree: int | None = None
     pieces: bool = False
 
 
@@ -101,6 +104,9 @@ class LawKernels:
     `pulse.breakpoints`.
     is_smooth (record): of a law with modes, whether it has one mode only as it is stated.
     is_watched (record): whether modes may come and go by time alone, so that steps have to be short.
+    is_even (record): of a law with modes or formulas, whether what members near each other do can be told from few of
+    them where their modes are the same: margins are, at one time, the least of functions that are linear in x and xd
+    and know no free length; and within a mode force and energy are as smooth as polynomials. None: it is not.
     data (record, at): parameters and numbers for `curves`, of which the first will stand at place `at`; a law that has
     it does not use `Law.row`; parameters that vary stand first in its row.
     """
@@ -119,4 +125,10 @@ class LawKernels:
     breakpoints: Callable[[Any, bool], list[float]] | None = None
     is_smooth: Callable[[Any], bool] | None = None
     is_watched: Callable[[Any], bool] | None = None
+    is_even: Callable[[Any], bool] | None = None
     data: Callable[[Any, int], tuple[list[float], list[float]]] | None = None
+
+
+def always(record: Any) -> bool:
+    """True of every law of a kind, whatever its parameters are: for `LawKernels.is_even`."""
+    return True

@@ -199,6 +199,12 @@ def law_is_idle(code, mode):
     return False
 
 
+@chosen(LISTED, lambda each: each.modes and each.modes.degree, inline)
+def law_degree(code):
+    """Of which degree at most the force is in the elongation within a mode, `Modes.degree`; 0 where none is known."""
+    return 0
+
+
 @chosen(LISTED, lambda each: (each.modes is not None and each.modes.pieces) or None, inline)
 def law_has_pieces(code):
     """Whether modes are pieces of one smooth function: steps need not end where a mode does."""
