@@ -446,8 +446,11 @@ class Evaluator:
         self._unused().compile_responses()
 
     def compile_method(self, method: str) -> None:
-        """Compile what a method of differentiation calls beside that, of a scene with joints or other laws."""
-        cast("GeneralDriver", self._unused()).compile_method(method)
+        """Compile what a method of differentiation calls beside that, where another process can: by the kernels of
+        general scenes."""
+        driver = (self._other_of(method, gradient=True) or self)._unused()
+        if not SENSITIVITIES[method].comes_with_values:
+            cast("GeneralDriver", driver).compile_method(method)
 
     def compile_steps(self) -> None:
         """Compile what makes steps of a scene with joints or other laws, without making any."""

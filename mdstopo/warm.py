@@ -13,6 +13,7 @@ from pathlib import Path
 
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.children import command
 from mdstopo.compiler.store import are_kept, cache_folder, is_kept
 from mdstopo.scene.family import beyond_springs
@@ -48,16 +49,22 @@ def mark_compiled(integrator: str) -> None:
         _marker(integrator).touch()
 
 
-def compiling(case: Case) -> str:
-    """What is said before the kernels for such a case are compiled for the first time."""
-    how_long = "about a minute" if beyond_springs(case) else "up to half a minute"
+def needs_general(case: Case, methods: Sequence[str] = ()) -> bool:
+    """Whether the case, or one of these methods of differentiation, needs the kernels of general scenes."""
+    return bool(beyond_springs(case)) or not all(SENSITIVITIES[method].comes_with_values for method in methods)
+
+
+def compiling(case: Case, methods: Sequence[str] = ()) -> str:
+    """What is said before the kernels for such a case, and these methods, are compiled for the first time."""
+    how_long = "about a minute" if needs_general(case, methods) else "up to half a minute"
     return f"compiling the kernels, once for this version: {how_long}"
 
 
-def compilation_due(case: Case) -> bool:
-    """Whether the kernels of this version have never been compiled here for such a case."""
+def compilation_due(case: Case, methods: Sequence[str] = ()) -> bool:
+    """Whether kernels of this version have never been compiled here for such a case and these methods."""
     include_kernels(case)
-    return not are_kept("mdstopo.general." if beyond_springs(case) else "mdstopo.integrators.")
+    due = needs_general(case, methods) and not are_kept("mdstopo.general.")
+    return due or not (beyond_springs(case) or are_kept("mdstopo.integrators."))
 
 
 class BackgroundCompiler:

@@ -112,7 +112,7 @@ def command(
     path = result_path(out, case, "gradient")
     line = shlex.join(["mdstopo", *sys.argv[1:]])
     with output_file(path, case, "gradient", overwrite=overwrite, notify=output.notice, command=line) as file:
-        announce_compilation(output, case)
+        announce_compilation(output, case, methods)
         from mdstopo.evaluators import evaluator_of
         from mdstopo.session.compiling_apart import RESPONSES, compiling_in_background
         from mdstopo.status import RunStatus

@@ -1,6 +1,6 @@
 """Arguments and options that several commands share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -138,9 +138,9 @@ def result_path(out: Path | None, case: "Case", kind: str = "") -> Path:
     return Path("results") / (f"{case.name}.{kind}.h5" if kind else f"{case.name}.h5")
 
 
-def announce_compilation(output: Output, case: "Case") -> None:
-    """Say that the first run takes longer, before it does."""
+def announce_compilation(output: Output, case: "Case", methods: Sequence[str] = ()) -> None:
+    """Say that the first run takes longer, before it does. methods: of differentiation, beside the case's own."""
     from mdstopo.warm import compilation_due, compiling
 
-    if compilation_due(case):
-        output.announce(compiling(case))
+    if compilation_due(case, methods):
+        output.announce(compiling(case, methods))

@@ -28,7 +28,7 @@ from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.starts.evaluator_interface import even, problem_of
 from mdstopo.starts.getting_ready import FEW, get_ready, load_optimizer, motions
-from mdstopo.warm import compilation_due, compiling, tiny
+from mdstopo.warm import compilation_due, compiling, needs_general, tiny
 
 #: the words that have a process compile what evaluates steps, with the optimiser and without it, and what makes steps
 BACK, RESPONSES, STEPS = "back", "responses", "steps"
@@ -72,15 +72,15 @@ def _compile_in_children(message: bytes, each: list[list[str]]) -> None:
 
 @contextlib.contextmanager
 def compiling_in_background(case: Case, share: str, methods: Sequence[str] = ()) -> Iterator[None]:
-    """Meanwhile another process compiles a share of what a scene with joints or other laws needs, where nothing of it
-    is there yet: with RESPONSES what evaluates steps, and behind that what these methods of differentiation call; with
-    STEPS what makes steps, where `auto` has to.
+    """Meanwhile another process compiles a share of what the kernels of general scenes are needed for, where none of
+    these are there yet: with RESPONSES what evaluates steps, and behind that what these methods of differentiation
+    call, which springs between free bodies need as well; with STEPS what makes steps, where `auto` has to.
 
     What this process does meanwhile finds on the disk what the other one has compiled.
     """
     child = None
     with contextlib.suppress(OSError):  # no process can be started, or it has ended
-        if beyond_springs(case) and compilation_due(case):
+        if needs_general(case, methods) and compilation_due(case, methods):
             child = _begin([share, *methods])
             _tell(child, pickle.dumps(case))
     try:
@@ -137,7 +137,8 @@ def _main() -> None:
     end_with_parent(sys.stdin.buffer)
     if RESPONSES in sys.argv[1:]:
         engine = evaluator_of(case, in_background=False)
-        engine.compile_responses()
+        if beyond_springs(case):
+            engine.compile_responses()
         for method in sys.argv[2:]:
             engine.compile_method(method)
     elif STEPS in sys.argv[1:]:
