@@ -26,6 +26,8 @@ FOLLOWED = 12
 AT_ONCE = 2**21
 #: error of the samples of a force, relative: they lie on the steps' quintic
 BESIDE = 0.02
+#: peaks are at most so many times the largest sample of a force
+BETWEEN = 2.0
 
 
 def compete(kind: int, reduction: ReductionKind) -> bool:
@@ -52,8 +54,10 @@ def members_peaks(
     at_once = not final and len(members) * len(places) <= AT_ONCE
     nobody = np.zeros(0, dtype=np.int64)
     top, seen_all = compare(driver, j, places, members if at_once else nobody, count)
-    near = np.flatnonzero(top >= (1.0 - window) * top.max())
-    who = np.sort(near[np.argsort(-top[near], kind="stable")[: max(FOLLOWED, most)]])
+    least = (1.0 - window) * float(top.max())
+    height = _heights(top, seen_all.reshape(-1, count, len(fractions), 2), t, fractions, least) if at_once else top
+    near = np.flatnonzero(height >= least)
+    who = np.sort(near[np.argsort(-height[near], kind="stable")[: max(FOLLOWED, most)]])
     if final:
         seen = [driver.evaluate_one(j, count, places[0], who=int(i)).copy() for i in who]
         return [row_of(t[-1], s[0], count - 1, 1.0, s[1], 1.0, i) for s, i in zip(seen, who.tolist(), strict=True)]
@@ -65,12 +69,34 @@ def members_peaks(
         seen_all, plain = _inside(driver, j, t, who, seen_all, limit)
     rows = []
     for i, seen_one in zip(who.tolist(), seen_all, strict=True):
-        own = min(window, 1.0 - limit / top[i]) if top[i] > 0.0 else window
+        own = min(window, 1.0 - limit / height[i]) if height[i] > 0.0 else window
         force, rate = np.moveaxis(seen_one, 2, 0)
         sign = np.where(force >= 0.0, 1.0, -1.0)
         samples = np.stack([sign * force, sign * rate, np.full(force.shape, float(i))], axis=2)
         rows += list(driver.peaks_of_pieces(j, count, t, samples, 1.0, own, who=i, plain=plain))
     return rows
+
+
+def _heights(top: FloatArray, seen: FloatArray, t: FloatArray, fractions: FloatArray, least: float) -> FloatArray:
+    """How high the force of each member may be (N): its largest sample, or, where that is below `least`, what its
+    tangents at samples allow. Where it rises at one sample and falls at the next they meet at or above what lies
+    between, if that bends downwards throughout.
+
+    top (M,): the largest sample of each member (N).
+    seen (M, m, F, 2): forces (N) and rates (N/s) at these fractions of every step.
+    t (m + 1,): the steps' times (s). fractions (F,): of steps.
+    """
+    height = top.copy()
+    doubtful = np.flatnonzero((top < least) & (top >= least / BETWEEN))
+    sign = np.where(seen[doubtful, ..., 0] >= 0.0, 1.0, -1.0)
+    force, rate = (sign * seen[doubtful, ..., k] for k in range(2))
+    before, after, rise, fall = force[..., :-1], force[..., 1:], rate[..., :-1], -rate[..., 1:]
+    h = np.diff(t)[:, None] * np.diff(fractions)
+    peaked = (rise > 0.0) & (fall > 0.0)
+    both = np.where(peaked, rise + fall, 1.0)
+    meeting = np.where(peaked, before + rise * np.clip((after - before + fall * h) / both, 0.0, h), 0.0)
+    height[doubtful] = np.maximum(top[doubtful], meeting.max(axis=(1, 2), initial=0.0))
+    return height
 
 
 def _places(steps: IndexArray, fractions: FloatArray) -> FloatArray:

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.general.competing_members import compare
+from mdstopo.evaluation import Rows
+from mdstopo.general.competing_members import _heights, compare
 from mdstopo.integrators.steps import OF_SAMPLES, OK
 
 GRID = """
@@ -127,3 +130,46 @@ def test_forces_at_ends_of_steps_are_those_of_a_balance_there(integrator, few):
         np.testing.assert_allclose(sign * seen[i, :, 0], value, rtol=1e-12, atol=1e-12 * value.max())
         np.testing.assert_allclose(sign * seen[i, :, 1], rate, rtol=1e-6, atol=1e-6 * np.abs(rate).max())
         assert top[i] == pytest.approx(value.max(), rel=1e-12)
+
+
+SWING = """
+format: 1
+time: {{end: 2}}
+bodies: {{ball: {{mass: 1, inertia: 1, position: [0, 0], velocity: [{across}, {along}]}}}}
+points:
+  far: {{body: ground, grid: {{list: [[-100, 0], [0, -100]]}}}}
+  middle: {{body: ball, grid: {{list: [[0, 0], [0, 0]]}}}}
+members:
+  ties: {{from: far, to: middle, connect: pairs, law: {{type: spring, stiffness: 40}}}}
+loads: [{{body: ball, force: [{push}, 0]}}]
+design: {{initial: 1}}
+objectives: {{F: {{response: {{member_force: {{group: ties}}}}, over_time: max_abs}}}}
+solver: {{integrator: gauss, step: 0.5}}
+"""
+
+
+@pytest.mark.parametrize("push", [-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
+def test_a_member_whose_peaks_lie_between_coarse_samples_competes(push):
+    """Half a period in a step, at whose quarters forces are sampled: a narrow window has the highest of a wide one."""
+    reach = np.hypot(push / 40**0.5, 1.0) + abs(push) / 40**0.5
+    case = read_case(SWING.format(across=1.0, along=0.995 * reach, push=push))
+    evaluator = Evaluator(case)
+    wide, narrow = (
+        [(peak.time, peak.value) for peak in evaluator.evaluate(case.start, rows=Rows(window, 100)).peaks["F"]]
+        for window in (0.7, 0.02)
+    )
+    assert len(narrow) > 1
+    assert narrow == [each for each in wide if each[1] >= 0.98 * wide[0][1]]
+
+
+@given(st.floats(0.1, 1.4), st.floats(0.0, 1.0), st.booleans())
+def test_tangents_at_samples_meet_above_a_peak_between_them(apart, share, negative):
+    """Of a cosine, whose samples lie at both sides of its peak."""
+    t = np.array([-share * apart, (1.0 - share) * apart])
+    sign = -1.0 if negative else 1.0
+    seen = sign * np.stack([np.cos(t), -np.sin(t)], axis=-1)[None, None]
+    top = np.abs(seen[..., 0]).max(axis=(1, 2))
+    height = _heights(top, seen, t, np.array([0.0, 1.0]), 1.0)
+    assert height[0] >= 1.0 - 1e-12 or share in (0.0, 1.0)
+    assert top[0] <= height[0] <= 1.0 + 0.5 * apart**2
+    assert _heights(top, seen, t, np.array([0.0, 1.0]), top[0])[0] == top[0]
