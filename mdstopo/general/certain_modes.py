@@ -292,6 +292,23 @@ def _holds(code, p, curves, rest, t, mode, low, high, bound):
 
 
 @part
+def _all_begin(code, p, curves, rest, t, mode, bound):
+    """Whether all members of a law that remembers begin in a mode, and none with a permanent set.
+
+    Margins do not tell: crushing ends by its rate, at any elongation, but begins at the plateau.
+
+    code, p, curves, rest, t, mode, bound: as of `_holds`.
+    """
+    for corner in range(4):
+        x = bound[LOW] if corner < 2 else bound[HIGH]
+        rate = bound[SLOWEST] if corner % 2 == 0 else bound[FASTEST]
+        begun = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+        if begun != mode or law_first_set(code, p, x, mode) != 0.0:
+            return False
+    return True
+
+
+@part
 def _is_over(code, p, curves, rest, t, mode, low, high, bound):
     """Whether a mode has ended for all of them: a margin is not above its tangent.
 
@@ -356,10 +373,8 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
         if now < 0:
             now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
             begins = now
-            if remembers:
-                for c in range(LOW, HIGH + 1):
-                    if law_first_set(code, p, bound[c], now) != 0.0:
-                        return UNSURE, UNSURE
+            if remembers and not _all_begin(code, p, curves, rest, t, now, bound):
+                return UNSURE, UNSURE
         if _holds(code, p, curves, rest, t, now, low, high, bound):
             continue
         if m == 0 or now != begins or low != high or sign == 0.0 or sign != before:
