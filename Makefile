@@ -49,7 +49,7 @@ export NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING := 1
 .PHONY: help run test test-all test-times test-lowest test-numba test-bounds lint types docs reproduce gallery bench peers readme wheel try-wheel clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,19p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,20p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml

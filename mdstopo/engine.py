@@ -51,8 +51,10 @@ LOOSEST = 5e-5
 #: seconds that a load case takes from which on a thread of its own pays: one costs a tenth of that
 WORTH_A_THREAD = 1e-3
 
-#: steps that a time history has at least, and the method that has derivatives at every one of them
-HISTORY, (HISTORIES,) = 50, methods_having("of_histories")
+#: steps that a time history has at least
+HISTORY = 50
+#: a method that has derivatives at every time
+HISTORIES = methods_having("of_histories")[0]
 
 
 class Evaluator:

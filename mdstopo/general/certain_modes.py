@@ -7,8 +7,19 @@ direction e in the middle of both lines, any other vector d + w has the length
     L + e . w <= |d + w| <= L + e . w + |w_across|^2 / (2 (L - |w|)),
 
 and its direction differs from e + w_across / L by less than 0.6 |w|^2 / (L - |w|)^2 (half the second derivative of
-d / |d|, which is at most 2 / sqrt(3)). So elongations and rates have bounds whose width beyond the linear part falls
-with the square of the part. Bounds of a margin follow where it is the least of linear functions: at the corners.
+d / |d|, which is at most 2 / sqrt(3)), and from e by |w| / (L - |w|) at most. The rate of its length is that direction
+times its velocity, which is v = d_0' + S' q in the middle, and v + S' h where the second point is off by h. With a
+reach r that neither |w| nor |h| exceeds, the rate is
+
+    e . v + e . S' h + w_across . v / L    +- (0.6 |v| r^2 / (L - r)^2 + |S'| r^2 / (L - r)).
+
+What is linear in the s of both points is largest where these are 1 or -1. A bulge b adds b to the length, and
+b (|v| / L + |S'|) to the rate. So elongations and rates have bounds whose width beyond the linear part falls with the
+square of the part. Bounds of a margin follow where it is the least of linear functions: at the corners.
+
+All members may leave a mode between the same two nodes by two switches of a formula, which they need not reach in the
+same order. Their prices then have a kink where both are reached at once. It divides the part, so it shows in the prices
+of a few, too.
 """
 
 import math
@@ -281,6 +292,23 @@ def _holds(code, p, curves, rest, t, mode, low, high, bound):
 
 
 @part
+def _all_begin(code, p, curves, rest, t, mode, bound):
+    """Whether all members of a law that remembers begin in a mode, and none with a permanent set.
+
+    Margins do not tell: crushing ends by its rate, at any elongation, but begins at the plateau.
+
+    code, p, curves, rest, t, mode, bound: as of `_holds`.
+    """
+    for corner in range(4):
+        x = bound[LOW] if corner < 2 else bound[HIGH]
+        rate = bound[SLOWEST] if corner % 2 == 0 else bound[FASTEST]
+        begun = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+        if begun != mode or law_first_set(code, p, x, mode) != 0.0:
+            return False
+    return True
+
+
+@part
 def _is_over(code, p, curves, rest, t, mode, low, high, bound):
     """Whether a mode has ended for all of them: a margin is not above its tangent.
 
@@ -345,10 +373,8 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
         if now < 0:
             now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
             begins = now
-            if remembers:
-                for c in range(LOW, HIGH + 1):
-                    if law_first_set(code, p, bound[c], now) != 0.0:
-                        return UNSURE, UNSURE
+            if remembers and not _all_begin(code, p, curves, rest, t, now, bound):
+                return UNSURE, UNSURE
         if _holds(code, p, curves, rest, t, now, low, high, bound):
             continue
         if m == 0 or now != begins or low != high or sign == 0.0 or sign != before:

@@ -28,19 +28,15 @@ from mdstopo.general.priced_candidates import (
     WHOLE,
 )
 from mdstopo.mechanics.kinematics.kinematics_interface import (
-    ALONG as ALONG_CHANGE,
-)
-from mdstopo.mechanics.kinematics.kinematics_interface import (
+    ALONG,
     ELONGATION,
     INVERSE,
+    RATE,
     WORKS,
     member_motion,
     member_work,
     member_works,
     second_rate,
-)
-from mdstopo.mechanics.kinematics.kinematics_interface import (
-    RATE as SPEED,
 )
 from mdstopo.mechanics.laws.law_table import (
     law,
@@ -56,9 +52,8 @@ from mdstopo.mechanics.laws.law_table import (
 
 #: points and weights of an integral over a piece of a step, as fractions of it (Gauss)
 GAUSS = 0.5 * np.array(np.polynomial.legendre.leggauss(5)) + np.array([[0.5], [0.0]])
-#: what is known of a member at the nodes: elongation, its rate; its part of the virtual change
+#: what is known of a member at the nodes: the first rows of `member_works`, ELONGATION, RATE and ALONG
 NODE_ROWS = 3
-X, RATE, ALONG = range(NODE_ROWS)
 #: pieces of a step in which a member stays in a mode: the fraction at which one begins, the mode, the permanent set;
 #: how many changes are followed, and to which fraction of the step each is located
 PIECE = 3
@@ -195,16 +190,16 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
         member_works(model, at, count, candidates.node_pose[o], candidates.node_change[o], works[m])
     for i in range(count):
         for m in range(NODES):
-            node[X, m] = works[m, ELONGATION, i]
-            node[RATE, m] = works[m, SPEED, i]
+            node[ELONGATION, m] = works[m, ELONGATION, i]
+            node[RATE, m] = works[m, RATE, i]
         rest = free[at + i]
         mode = np.int64(begin[i])
         kept = begin_set[i]
         if not found:
-            mode = np.int64(law_start(code, p, node[X, 0], node[RATE, 0], 0.0, time[0], curves, rest))
-            if not law_margin(code, p, node[X, 0], node[RATE, 0], mode, time[0], curves, rest) > CLOSE:
+            mode = np.int64(law_start(code, p, node[ELONGATION, 0], node[RATE, 0], 0.0, time[0], curves, rest))
+            if not law_margin(code, p, node[ELONGATION, 0], node[RATE, 0], mode, time[0], curves, rest) > CLOSE:
                 mode = _first_mode(model, candidates, k, at + i, s, node)
-            kept = law_first_set(code, p, node[X, 0], mode)
+            kept = law_first_set(code, p, node[ELONGATION, 0], mode)
         last = _follow(code, p, curves, rest, time, mode, kept, node, power, pieces)
         modes[1, i] = int(pieces[last, PIECE_MODE])
         sets[1, i] = pieces[last, PIECE_SET]
@@ -213,7 +208,7 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
         stay = stay or modes[2, i] != NOWHERE
         if last > 0 and step[MOVES] != 0:
             for m in range(NODES):
-                node[ALONG, m] = works[m, ALONG_CHANGE, i]
+                node[ALONG, m] = works[m, ALONG, i]
             price[i] += _over_pieces(code, p, curves, rest, time, level, weight, last, node, power, pieces)
     if not stay or step[MOVES] == 0:
         return
@@ -240,9 +235,9 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
                 price[i] += found_now[i]
             elif modes[2, i] != NOWHERE and now[INVERSE, i] != 0.0:
                 f, _, _, energy, _ = law(
-                    code, p, now[ELONGATION, i], now[SPEED, i], modes[2, i], t, value, curves, free[at + i]
+                    code, p, now[ELONGATION, i], now[RATE, i], modes[2, i], t, value, curves, free[at + i]
                 )  # fmt: skip
-                price[i] += f * now[ALONG_CHANGE, i] + candidates.energy[o] * energy
+                price[i] += f * now[ALONG, i] + candidates.energy[o] * energy
 
 
 @part
@@ -310,7 +305,7 @@ def add_polynomial(code, p, curves, t, value, weight, works, count, mode, node, 
         for a in range(places - 2, -1, -1):
             force = force * s + power[0, a]
             stored = stored * s + power[1, a]
-        work = (force + by_rate * load(works[SPEED], i)) * load(works[ALONG_CHANGE], i)
+        work = (force + by_rate * load(works[RATE], i)) * load(works[ALONG], i)
         there = load(works[INVERSE], i)
         store(price, i, load(price, i) + (work + where_larger(there, 0.0, stored)))
 
@@ -325,9 +320,9 @@ def add_in_mode(code, p, curves, t, value, weight, free, works, mode, price):
     for i in range(price.shape[0]):
         if works[INVERSE, i] != 0.0:
             f, _, _, energy, _ = law(
-                code, p, works[ELONGATION, i], works[SPEED, i], mode, t, value, curves, free[i]
+                code, p, works[ELONGATION, i], works[RATE, i], mode, t, value, curves, free[i]
             )  # fmt: skip
-            price[i] += f * works[ALONG_CHANGE, i] + weight * energy
+            price[i] += f * works[ALONG, i] + weight * energy
 
 
 @kernel
@@ -346,8 +341,8 @@ def _first_mode(model, candidates, k, i, s, node):
     second = second_rate(model, i, r, candidates.node_a[first]) if length > 0.0 else 0.0
     return np.int64(
         law_start(
-            candidates.run[k, CODE], candidates.law[k], node[X, 0], node[RATE, 0], second, candidates.step_time[s, 0],
-            model.curves, rest,
+            candidates.run[k, CODE], candidates.law[k], node[ELONGATION, 0], node[RATE, 0], second,
+            candidates.step_time[s, 0], model.curves, rest,
         )
     )  # fmt: skip
 
@@ -357,14 +352,15 @@ def _first_over(code, p, curves, rest, time, node, begin, mode, kept):
     """The first node behind a fraction of a step at which a mode has ended; NODES where it has at none.
 
     code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
-    time (2,): start and length of the step (s). node (NODE_ROWS, NODES): the member there, of which X and RATE count.
+    time (2,): start and length of the step (s).
+    node (NODE_ROWS, NODES): the member there, of which ELONGATION and RATE count.
     begin: the fraction.
     mode, kept: the mode, and the permanent set (m).
     """
     for m in range(1, NODES):
         if NODE[m] > begin:
             t = time[0] + NODE[m] * time[1]
-            if law_margin(code, p, node[X, m] - kept, node[RATE, m], mode, t, curves, rest) < 0.0:
+            if law_margin(code, p, node[ELONGATION, m] - kept, node[RATE, m], mode, t, curves, rest) < 0.0:
                 return m
     return NODES
 
@@ -404,10 +400,10 @@ def _margin(code, p, curves, rest, time, power, c, mode, kept):
     """How far a mode is from its end at a fraction c of a step.
 
     code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
-    time (2,): start and length of the step (s). power (NODE_ROWS, NODES): coefficients of X and RATE.
+    time (2,): start and length of the step (s). power (NODE_ROWS, NODES): coefficients of ELONGATION and RATE.
     mode, kept: the mode, and the permanent set (m).
     """
-    x = polynomial(power[X], c) - kept
+    x = polynomial(power[ELONGATION], c) - kept
     return law_margin(code, p, x, polynomial(power[RATE], c), mode, time[0] + c * time[1], curves, rest)
 
 
@@ -419,7 +415,7 @@ def _located(code, p, curves, rest, time, power, lower, upper, mode, kept):
     left a quarter of it.
 
     code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
-    time (2,): start and length of the step (s). power (NODE_ROWS, NODES): coefficients of X and RATE.
+    time (2,): start and length of the step (s). power (NODE_ROWS, NODES): coefficients of ELONGATION and RATE.
     lower, upper: fractions at which the mode has not ended, and has.
     mode, kept: the mode, and the permanent set (m).
     """
@@ -462,7 +458,7 @@ def _follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
       code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
       time (2,): start and length of the step (s).
       mode, kept: those with which it begins.
-      node (NODE_ROWS, NODES): X and RATE of the member.
+      node (NODE_ROWS, NODES): ELONGATION and RATE of the member.
     Out:
       power (NODE_ROWS, NODES): coefficients of these, unless it stays in its mode.
       pieces (CHANGES + 1, PIECE): set.
@@ -481,7 +477,7 @@ def _follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
         if over == NODES:
             return last
         if last == 0:
-            _fill_power(node[X], power[X])
+            _fill_power(node[ELONGATION], power[ELONGATION])
             _fill_power(node[RATE], power[RATE])
         lower = max(begin, NODE[over - 1])
         upper = NODE[over]
@@ -489,7 +485,7 @@ def _follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
             upper = _located(code, p, curves, rest, time, power, lower, upper, mode, kept)
         else:
             upper = lower
-        x = polynomial(power[X], upper) - kept
+        x = polynomial(power[ELONGATION], upper) - kept
         rate = polynomial(power[RATE], upper)
         second = _slope(power[RATE], upper) / time[1]
         new = law_next(code, p, x, rate, second, mode, time[0] + upper * time[1], curves, rest)
@@ -534,7 +530,7 @@ def _over_pieces(code, p, curves, rest, time, level, weight, last, node, power, 
             c = begin + wide * GAUSS[0, g]
             value = polynomial(level, c) if given else 0.0
             f, _, _, energy, _ = law(
-                code, p, polynomial(power[X], c) - pieces[at, PIECE_SET], polynomial(power[RATE], c), mode,
+                code, p, polynomial(power[ELONGATION], c) - pieces[at, PIECE_SET], polynomial(power[RATE], c), mode,
                 time[0] + c * time[1], value, curves, rest,
             )  # fmt: skip
             work = f * polynomial(power[ALONG], c)

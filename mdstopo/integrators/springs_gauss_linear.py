@@ -1,7 +1,7 @@
 """Gauss collocation, linearised: dense output, the reverse step (`steps_interface`).
 
-All three work on the stages that `gauss.simulate` kept. Reverse and tangent steps solve the same linear balance of a
-window, transposed or not, by sweeps that contract as the forward ones did.
+Both work on the stages that `springs_gauss` kept. The reverse step solves the transposed linear balance of a window by
+sweeps that contract as the forward ones did.
 """
 
 import numpy as np

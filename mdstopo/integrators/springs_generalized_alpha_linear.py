@@ -2,8 +2,8 @@
 
 Between two steps q is the cubic through both ends with their velocities, and v is its derivative, so that a peak of a
 response is a stationary point of the very motion it is read from. What a step takes over from the one before beside
-q and v are the acceleration and the auxiliary one (rows 0 and 1 of lam_x and dx); a step that starts a segment of the
-loads makes its own.
+q and v are the acceleration and the auxiliary one (rows 0 and 1 of lam_x); a step that starts a segment of the loads
+makes its own.
 """
 
 import numpy as np

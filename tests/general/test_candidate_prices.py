@@ -380,6 +380,25 @@ def test_a_dense_pass_by_laws_with_modes_knows_all_load_cases():
     assert_dense(arm(DENSE["slack"], **TWICE))
 
 
+def test_a_dense_pass_knows_members_that_begin_beyond_their_plateau_and_move_back():
+    """Beside others that are not stretched so far, and some that do not act yet."""
+    begin, end = np.array([0.905, -0.305]), np.array([1.205, -1.1])
+    law = DENSE["crushed"]
+    free = np.linalg.norm(end - begin) - law["force"] / law["stiffness"]
+    scene = dense(arm({**law, "free_length": free}), 0.01)
+    # about its hinge, 0.4 m above it
+    scene["bodies"]["foot"] |= {"angular_velocity": 2, "velocity": [0.8, 0]}
+    candidates, states = states_of(scene, 0.0)
+    common = candidates.common(states, 0.0)
+    every = np.arange(candidates.shape[0] * candidates.shape[1])
+    _, found = candidates.tiles(states, common, every, True)
+    assert common[ERROR] > 0.0
+    common[ERROR] = 0.0
+    _, exact = candidates.tiles(states, common, every, True)
+    there = np.isfinite(exact)
+    assert np.abs(found[there] - exact[there]).max() <= 1e-11 * np.abs(exact[there]).max()
+
+
 @pytest.mark.parametrize("name", ["slack", "curve"])
 def test_a_dense_pass_in_space_by_laws_with_modes_computes_few_of_the_prices(name):
     assert_dense(in_space(DENSE[name], **ENERGY), 0.0005)

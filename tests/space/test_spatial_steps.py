@@ -70,7 +70,7 @@ def test_derivatives_of_a_step_both_ways() -> None:
     dq, dv, bar_q, bar_v = random.normal(size=(4, N))
     changes = np.zeros((S, 3, N))
     for i in range(S):
-        KERNELS.stage_jvp(None, TABLE, h, i, q, v, dq, dv, changes)
+        KERNELS.stage_jvp(None, TABLE, h, 0, i, q, v, dq, dv, changes)
         changes[i, 2] = slopes[i] @ changes[i, 0] + BY_V @ changes[i, 1]
     end_dq, end_dv = dq.copy(), dv.copy()
     KERNELS.end_jvp(None, TABLE, S, h, q, v, changes, end_dq, end_dv)
