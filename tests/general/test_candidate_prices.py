@@ -380,8 +380,9 @@ def test_a_dense_pass_by_laws_with_modes_knows_all_load_cases():
     assert_dense(arm(DENSE["slack"], **TWICE))
 
 
-def test_a_dense_pass_knows_members_that_begin_beyond_their_plateau_and_move_back():
-    """Beside others that are not stretched so far, and some that do not act yet."""
+def test_a_dense_pass_knows_which_members_are_crushed_from_the_start():
+    """The foot swings towards the floor: members that are too short by the plateau or more are crushed at once, those
+    beside them are still elastic, and others do not act."""
     begin, end = np.array([0.905, -0.305]), np.array([1.205, -1.1])
     law = DENSE["crushed"]
     free = np.linalg.norm(end - begin) - law["force"] / law["stiffness"]
