@@ -20,7 +20,7 @@ from mdstopo.optimizer.competing_rows import (
 )
 from mdstopo.optimizer.gsao_state import GsaoState
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
-from mdstopo.optimizer.safeguards import FRESH, is_least, residual_unit
+from mdstopo.optimizer.safeguards import is_least, residual_unit
 from mdstopo.optimizer.violations import merit, plain_violation, scaled_violation
 from mdstopo.settings.optimizer_presets import Settings
 
@@ -123,11 +123,9 @@ class BundleMethod:
         state.penalty = RESTORED_PENALTY * state.penalty
 
     def _reset(self, state: GsaoState) -> bool:
-        """Drop rows of other designs, which may forbid what is possible; False where that was done too often here, or
-        has led to next to nothing."""
-        if state.resets >= RESETS or (state.resets and _is_as_good_as_at_reset(state, self.settings.tolerance)):
+        """Drop rows of other designs, which may forbid what is possible; False where that was done too often here."""
+        if state.resets >= RESETS:
             return False
-        state.forgotten = state.objective
         trust = RESET_TRUST * RESET_SHRINK**state.resets
         state.trust = min(trust, max(state.trust, LEAST_RESET_TRUST * trust))
         self._begin(state, state.penalty)
@@ -161,9 +159,8 @@ class BundleMethod:
         self._learn_concavity(state, seen, here, moved, there)
         negligible = settings.number("decrease_tolerance") * abs(here[0])
         small = abs(actual) <= negligible and abs(state.predicted) <= negligible
+        state.small = state.small + 1 if small else 0
         accepted = ratio >= settings.number("accept_ratio")
-        if small or accepted:  # what a rejected trial would have done undoes no count
-            state.small = state.small + 1 if small else 0
         if accepted:
             promised = moved.subset(state.bundle.own).levels(groups)
             self._count_stagnation(state, *(float(levels[1:].max(initial=0.0)) for levels in (here, promised, there)))
@@ -305,13 +302,6 @@ def _carried_over(concavity: Floats, groups: int) -> Floats:
     if groups == 1:
         return np.array([concavity[1:].max()])
     return np.concatenate([[0.0], np.full(groups - 1, concavity[0])])
-
-
-def _is_as_good_as_at_reset(state: GsaoState, tolerance: float) -> bool:
-    """Whether the objective is next to what it was when rows were last dropped, at an iterate that keeps the limits."""
-    if state.restoring or state.violation > tolerance:
-        return False
-    return state.objective >= state.forgotten - FRESH * abs(state.objective)
 
 
 def _steepness_of_highest(own: Bundle) -> float:

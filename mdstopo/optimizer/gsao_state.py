@@ -56,8 +56,7 @@ class GsaoState(State):
     What was found at the iterate: `rows` (R,), `gradients` (R, N), `constraint_rows` (C,), `constraint_gradients`
     (C, N), `violation` (`violations.scaled_violation`), and `row_details`, which rows are norms and which constraint
     each belongs to. What rejected trials have shown: `cuts` (K,), rows that were the highest there, linearised and seen
-    from the iterate, and `cut_gradients` (K, N); `forgotten`, the objective at which they, or the bundle method's rows
-    from elsewhere, were last dropped.
+    from the iterate, and `cut_gradients` (K, N); `forgotten`, the objective at which they were last dropped.
 
     Of the trial: `predicted`, the decrease of the merit function that the model promises. The adaptation: `shift` (N,)
     distances of the shifts, `step` the last accepted step, in files its difference (N,), `trust` the half width of the

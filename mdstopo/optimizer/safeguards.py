@@ -37,8 +37,7 @@ PENALTY_CEILING = 1e4
 CUT_WINDOW, CUT_TRUST, KEPT_WINDOW, KEPT_TRUST, MOST_CUTS, CUT_SHRINK = 0.02, 0.1, 0.15, 0.4, 24, 0.8
 # Iterations of which the last decrease is told.
 RECENT = 10
-# Share of the objective by which it must have fallen since cuts, or the bundle method's rows from elsewhere, were
-# dropped, before they are dropped again.
+# Share of the objective by which it must have fallen since cuts were dropped, before they are dropped again.
 FRESH = 1e-5
 # Share of the largest gradient so far that residuals are relative to at least.
 GRADIENT_SHARE = 1e-5

@@ -252,30 +252,6 @@ def test_steps_along_a_curved_limit_are_not_made_short_by_what_they_violate(stee
     assert len(problem.evaluated) <= most
 
 
-def test_rows_are_dropped_again_only_where_that_has_led_on():
-    problem = Toy(lambda x: (x.copy(), np.eye(1)), [10.0], 0.0, 20.0)
-    problem.competes = True
-    optimizer = Gsao(problem, settings())
-    state = optimizer.start()
-    assert optimizer.bundle.begin_anew(state, stuck=True)
-    assert state.resets == 1
-    assert not optimizer.bundle.begin_anew(state, stuck=True)
-    state.objective -= 1e-3
-    assert optimizer.bundle.begin_anew(state, stuck=True)
-    assert state.resets == 2
-
-
-def test_a_rejected_trial_undoes_no_count_of_small_steps():
-    problem = Toy(lambda x: (x.copy(), np.eye(1)), [10.0], 0.0, 20.0)
-    problem.competes = True
-    optimizer = Gsao(problem, settings())
-    for trial, small in ((11.0, 5), (9.0, 0)):
-        state = optimizer.start()
-        state.small, state.trial, state.predicted = 5, np.array([trial]), 1.0
-        optimizer.bundle.judge(state, problem.evaluate(state.trial))
-        assert state.small == small
-
-
 def test_what_was_seen_to_bend_is_known_while_limits_are_restored_and_after():
     problem = Toy(
         lambda x: (x[:1].copy(), np.array([[1.0, 0.0]])), [1.0, 1.0], -2.0, 2.0,
