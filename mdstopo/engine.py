@@ -15,6 +15,7 @@ import numpy as np
 from mdstopo.case.candidates import mirrored_groups
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, SMOOTH, STIFF
+from mdstopo.case.integrators import having as integrators_having
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
 from mdstopo.case.sensitivities import SENSITIVITIES, chosen
 from mdstopo.case.sensitivities import having as methods_having
@@ -226,10 +227,23 @@ class Evaluator:
         """The evaluator that differentiates by a method in this one's place, None where this one does: the integrator
         has to be one on whose steps the method is defined, and the kernels those that have the method."""
         if method in self._lacking:
-            return self.otherwise(sensitivity=method)
+            return self._general(method, integrators_having(SENSITIVITIES[method].steps)[0])
         if self.beyond or not gradient or SENSITIVITIES[method].comes_with_values:
             return None
-        return self.otherwise(sensitivity=method, integrator=self.integrator)
+        return self._general(method, self.integrator)
+
+    def _general(self, method: str, integrator: str) -> "Evaluator":
+        """An evaluator of the same case with that integrator and kernels of general scenes, which have the method.
+
+        The case keeps its own method: one with priced candidates has gradients by all methods, but is not optimised by
+        all.
+        """
+        key = ("general", method, integrator)
+        if key not in self._others:
+            case = replace(self.case, solver=replace(self.case.solver, integrator=integrator))
+            beyond = self._asked_beyond or f"the sensitivity method {method}"
+            self._others[key] = Evaluator(case, self._compiles_in_background, beyond=beyond)
+        return self._others[key]
 
     def _side_by_side(self, design: FloatArray, exact: bool, rows: Rows) -> dict[str, CallOutcome]:
         """Outcomes of all load cases by name, evaluated side by side on threads; empty where that does not pay.
@@ -341,7 +355,7 @@ class Evaluator:
         load_case = next(each.load_case for each in self.case.objectives if each.name == objective)
         place = list(self._by_load_case[load_case]).index(objective)
         if not self.beyond:
-            return self.otherwise(sensitivity=HISTORIES, integrator=self.integrator)._histories(design, objective)
+            return self._general(HISTORIES, self.integrator)._histories(design, objective)
         driver = cast("GeneralDriver", self.driver(load_case))
         status, t, lines = driver.histories(self.computed(design), place)
         return status, t, lines if self._design_map is None else self._design_map.pull_back(lines)

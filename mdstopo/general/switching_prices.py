@@ -213,9 +213,11 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
     if not stay or step[MOVES] == 0:
         return
     main = np.int64(NOWHERE)
+    like = np.int64(0)
     for i in range(count):
         if main == NOWHERE:
             main = modes[2, i]
+            like = np.int64(i)
     quick = quick and law_degree(code) > 0
     now = works[NODES]
     found_now = works[NODES + 1, 0]
@@ -225,19 +227,24 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
         member_works(model, at, count, candidates.pose[o, 0], candidates.change[o, 0], now)
         for i in range(count):
             now[ELONGATION, i] -= sets[2, i]
-        if quick:
-            found_now[:] = 0.0
-            add_polynomial(
-                code, p, curves, t, value, candidates.energy[o], now, count, main, node, power, found_now
-            )  # fmt: skip
-        for i in range(count):
-            if quick and modes[2, i] == main:
-                price[i] += found_now[i]
-            elif modes[2, i] != NOWHERE and now[INVERSE, i] != 0.0:
+            if modes[2, i] != NOWHERE and now[INVERSE, i] != 0.0 and not (quick and modes[2, i] == main):
                 f, _, _, energy, _ = law(
                     code, p, now[ELONGATION, i], now[RATE, i], modes[2, i], t, value, curves, free[at + i]
                 )  # fmt: skip
                 price[i] += f * now[ALONG, i] + candidates.energy[o] * energy
+        if not quick:
+            continue
+        for i in range(count):
+            if modes[2, i] != main:
+                # the polynomial is as exact as the range of the members that it is for is narrow
+                now[ELONGATION, i] = now[ELONGATION, like]
+        found_now[:] = 0.0
+        add_polynomial(
+            code, p, curves, t, value, candidates.energy[o], now, count, main, node, power, found_now
+        )  # fmt: skip
+        for i in range(count):
+            if modes[2, i] == main:
+                price[i] += found_now[i]
 
 
 @part

@@ -452,22 +452,8 @@ def random_law(rng):
     return {"type": str(kind), **own, **later}
 
 
-@settings(max_examples=examples(10, 80), derandomize=True, deadline=None)
-@given(st.integers(0, 10**6))
-def test_passes_over_random_tiles_know_what_each_of_their_candidates_is_worth(seed):
-    rng = np.random.default_rng(seed)
-    looks = [ENERGY, looked("energy", "mean"), looked(PULL, "max"), looked(PUSH, "rms"), STOP, {}]
-    scene = arm(random_law(rng), **looks[rng.integers(len(looks))])
-    assert_all_are_known(dense(scene, 10.0 ** rng.uniform(-2.5, -0.5)))
-
-
-def test_a_dense_pass_in_space_by_legs_that_are_crushed_knows_all_prices():
-    assert_all_are_known(dense(in_space(DENSE["crushed"], **ENERGY)))
-
-
-def assert_all_are_known(scene):
-    """A pass over tiles finds the prices that candidates have one by one."""
-    candidates, states = states_of(scene, 0.2)
+def assert_pass_is_right(candidates, states):
+    """A pass knows what each of its candidates is worth."""
     common = candidates.common(states, 0.0)
     every = np.arange(candidates.shape[0] * candidates.shape[1])
     _, found = candidates.tiles(states, common, every, True)
@@ -477,6 +463,27 @@ def assert_all_are_known(scene):
     assert np.array_equal(there, np.isfinite(found))
     # where nothing is worth anything, prices are rounding
     assert np.abs(found[there] - exact[there]).max() <= 5.0 * max(error, 1e-12 * np.abs(exact[there]).max(), 1e-20)
+
+
+@settings(max_examples=examples(10, 80), derandomize=True, deadline=None)
+@given(st.integers(0, 10**6))
+def test_passes_over_random_tiles_know_what_each_of_their_candidates_is_worth(seed):
+    rng = np.random.default_rng(seed)
+    looks = [ENERGY, looked("energy", "mean"), looked(PULL, "max"), looked(PUSH, "rms"), STOP, {}]
+    scene = dense(arm(random_law(rng), **looks[rng.integers(len(looks))]), 10.0 ** rng.uniform(-2.5, -0.5))
+    assert_pass_is_right(*states_of(scene, 0.2))
+
+
+def test_a_dense_pass_in_space_by_legs_that_are_crushed_knows_all_prices():
+    assert_pass_is_right(*states_of(dense(in_space(DENSE["crushed"], **ENERGY)), 0.2))
+
+
+def test_prices_of_members_in_one_mode_do_not_lose_digits_to_members_beside_them_in_another():
+    """Of members that are crushed within 0.2 mm, some begin to act beside others that are a metre longer or shorter."""
+    scene = arm({"type": "crush", "stiffness": 1e7, "force": 2000.0, "free_length": 1.0}, **looked("energy", "mean"))
+    for name, count, begin, end in (("p", TALL, [0.9, -0.3], [0.901, -0.301]), ("q", BROAD, [-100, -1.1], [100, -1.1])):
+        scene["points"][name]["grid"] = {"line": {"from": begin, "to": end, "count": count}}
+    assert_pass_is_right(*states_of(scene, 0.0))
 
 
 def test_formulas_that_may_be_sharp_anywhere_are_priced_one_by_one():

@@ -110,6 +110,18 @@ def test_prices_are_the_gradient_of_candidates_that_are_built(name):
     assert np.abs(candidates.prices(states, i, j) - gradient).max() <= AGREE * np.abs(gradient).max()
 
 
+def test_all_methods_differentiate_by_the_members_that_are_built():
+    """Though a case that names another method than the adjoint one cannot price the others."""
+    evaluator = Evaluator(read_case(json.dumps({"format": 1, **SCENES["max"]})))
+    alpha = np.random.default_rng(5).uniform(0.1, 1.0, evaluator.case.n_design)
+    usual = evaluator.evaluate(alpha).gradients["G"]
+    direct = evaluator.evaluate(alpha, sensitivity="direct").gradients["G"]
+    assert np.abs(direct - usual).max() <= AGREE * np.abs(usual).max()
+    status, t, lines = evaluator.histories(alpha, "G")
+    assert status.ok
+    assert lines.shape == (len(t), len(alpha))
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_a_pass_finds_the_best_candidates_and_what_all_gain(name):
     candidates, (i, j), states, gradient, there, case = priced(SCENES[name])
