@@ -371,7 +371,8 @@ class GeneralDriver:
             total = self._integral_with_gradient(j, reduction.power, count, gradient, self.gradients[j, 0])
             value, slope = value_of_integral(reduction, total, float(t[count] - t[0]))
             rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
-            self.gradients[j, 0] *= slope
+            if gradient:
+                self.gradients[j, 0] *= slope
             self.found[j] = 1
             if switches_of(self.scene.model, j):
                 pieces = Pieces(self, j, t[: count + 1].copy())
