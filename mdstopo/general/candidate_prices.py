@@ -23,7 +23,7 @@ from mdstopo.general.priced_candidates import (
     SCENE,
     unpack_candidates,
 )
-from mdstopo.general.switching_prices import ROW, make_room, price_followed
+from mdstopo.general.switching_prices import ROW, make_following, price_followed
 from mdstopo.general.tile_sweep import load_members, make_lists, price_run
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     has_spring_energies,
@@ -260,10 +260,10 @@ def _price_run(model, candidates, k, count, row, member_state, price):
     p = candidates.law[k]
     code = run[CODE]
     if run[MODES] == FOLLOWED:
-        room = make_room()
+        following = make_following()
         for at in range(0, count, ROW):
             wide = min(ROW, count - at)
-            price_followed(model, candidates, k, at, wide, room, price[at : at + wide])
+            price_followed(model, candidates, k, at, wide, following, price[at : at + wide])
         return
     elastic = code == SPRING and p[1] == 0.0 and p[2] == 0.0
     begin = run[FIRST_STATE]

@@ -281,7 +281,7 @@ def _holds(code, p, curves, rest, t, mode, low, high, bound):
     t: time (s).
     mode: the mode.
     low, high: the least and the largest permanent set (m).
-    bound (4,): of `fill_bounds`.
+    bound (4,): of `_fill_bounds`.
     """
     for corner in range(4):
         x = bound[LOW] - high if corner < 2 else bound[HIGH] - low
@@ -357,14 +357,13 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
     begin = candidates.when[o] if at_state else candidates.step_time[s, 0]
     long = 0.0 if at_state else candidates.step_time[s, 1]
     remembers = law_remembers(code)
+    axes = freedoms(model) - rotations(model)
     begins = mode
     now = mode
     sign = 0.0
     for m in range(1 if at_state else NODES):
         t = begin + NODE[m] * long
-        if not _fill_bounds(
-            freedoms(model) - rotations(model), frame, first + m, line, rows, number, w, bound
-        ):  # fmt: skip
+        if not _fill_bounds(axes, frame, first + m, line, rows, number, w, bound):
             return UNSURE, UNSURE
         before = sign
         sign = 1.0 if bound[SLOWEST] > 0.0 else -1.0 if bound[FASTEST] < 0.0 else 0.0

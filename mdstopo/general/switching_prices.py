@@ -74,7 +74,7 @@ CLOSE = 1e-6
 
 
 @kernel
-def make_room():
+def make_following():
     """What following members needs: values at nodes, coefficients of the polynomials through them, pieces; what members
     do at nodes and at a stage, and prices; modes and permanent sets with which members begin a step, end it, stay.
     """
@@ -89,18 +89,18 @@ def make_room():
 
 
 @kernel
-def price_followed(model, candidates, k, at, count, room, price):
+def price_followed(model, candidates, k, at, count, following, price):
     """Add what members of a law that switches do in the steps of a run.
 
     model: with the members.
     candidates, k: a `PricedCandidates`, and the number of the run.
     at, count: the first member, and how many there are, ROW at most.
-    room: of `make_room`, overwritten.
+    following: of `make_following`, overwritten.
     price (count,): added to.
     """
     run = candidates.run[k]
-    modes = room[4]
-    sets = room[5]
+    modes = following[4]
+    sets = following[5]
     modes[:] = 0
     sets[:] = 0.0
     begun = run[FROM_START] == 0  # a law that acts later begins in mode 0, unset
@@ -114,7 +114,7 @@ def price_followed(model, candidates, k, at, count, room, price):
             continue
         if candidates.step[s, MOVES] == 0 and not law_remembers(run[CODE]):
             continue
-        price_step(model, candidates, k, at, count, s, modes[0], sets[0], begun, np.bool_(False), room, price)
+        price_step(model, candidates, k, at, count, s, modes[0], sets[0], begun, np.bool_(False), following, price)
         # a part of a step leaves the modes with which the whole one begins
         ends = np.int64(1)
         if kind == WHOLE:
@@ -154,7 +154,7 @@ def price_point(model, candidates, k, i, s, mode, kept, begun):
 
 
 @kernel
-def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quick, room, price):
+def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quick, following, price):
     """Add what members of a law that switches do in a step.
 
     A step in which a member stays in its mode is summed over its stages, as for a member that is built. In a step in
@@ -170,10 +170,10 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
       begun: whether they are in modes.
       quick: whether last digits may depend on which members are followed together.
     Out:
-      room: of `make_room`: its modes and sets in row 1 are those with which the members end.
+      following: of `make_following`: its modes and sets in row 1 are those with which the members end.
       price (count,): added to.
     """
-    node, power, pieces, works, modes, sets = room
+    node, power, pieces, works, modes, sets = following
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     curves = model.curves
@@ -210,8 +210,23 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
             for m in range(NODES):
                 node[ALONG, m] = works[m, ALONG, i]
             price[i] += _over_pieces(code, p, curves, rest, time, level, weight, last, node, power, pieces)
-    if not stay or step[MOVES] == 0:
-        return
+    if stay and step[MOVES] != 0:
+        _add_stages(model, candidates, k, at, count, s, quick, following, price)
+
+
+@part
+def _add_stages(model, candidates, k, at, count, s, quick, following, price):
+    """Add what the members that stay in their modes do in a step: the second part of `price_step`.
+
+    model, candidates, k, at, count, s, quick, price: as there.
+    following: of `make_following`, of which row 2 of the modes and sets counts, NOWHERE where a member does not stay.
+    """
+    node, power, _, works, modes, sets = following
+    p = candidates.law[k]
+    code = candidates.run[k, CODE]
+    curves = model.curves
+    free = model.member[MEMBER_FREE_LENGTH]
+    step = candidates.step[s]
     main = np.int64(NOWHERE)
     like = np.int64(0)
     for i in range(count):

@@ -37,7 +37,7 @@ from mdstopo.general.switching_prices import (
     ROW,
     add_in_mode,
     add_polynomial,
-    make_room,
+    make_following,
     price_point,
     price_step,
 )
@@ -142,7 +142,7 @@ def price_run(model, candidates, k, tile, scratch, lists, price):
     """
     run = candidates.run[k]
     spans = make_spans(candidates.first.shape[1])
-    space = (scratch, lists, spans, make_room())
+    buffers = (scratch, lists, spans, make_following())
     _, i, j, _ = tile
     _, _, count, shared, modes, sets, todo, _, _, _, _ = lists
     for n in range(candidates.curves.shape[1]):
@@ -162,19 +162,17 @@ def price_run(model, candidates, k, tile, scratch, lists, price):
     for u in range(steps):
         if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, MOVES] == 0:
             continue
-        done += _price_next(
-            model, candidates, k, u, begun, ends, tile, space, price
-        )  # fmt: skip
+        done += _price_next(model, candidates, k, u, begun, ends, tile, buffers, price)
         if followed and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
             ends = np.int64(candidates.step[run[FIRST_STEP] + u, KIND] != WHOLE)
             begun = begun or ends == 0
     for part in range(PARTS_OF_ALL):
-        done += _price_list(model, candidates, k, part, tile, space, price)
+        done += _price_list(model, candidates, k, part, tile, buffers, price)
     return done / max(steps, 1)
 
 
 @kernel
-def _price_next(model, candidates, k, u, begun, ends, tile, space, price):
+def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
     """Go through a step: list it for the parts of which enough is known, and follow all other members.
 
     In:
@@ -183,7 +181,7 @@ def _price_next(model, candidates, k, u, begun, ends, tile, space, price):
       begun: whether members are in modes.
       ends: 1 where the last step was a part of one, and those of states alone are in `modes[1]`; else 0.
     In place:
-      space: of `make_scratch`, `make_lists`, `make_spans` and `make_room`, of which the lists matter.
+      buffers: of `make_scratch`, `make_lists`, `make_spans` and `make_following`, of which the lists matter.
       price (PLACES,): added to.
 
     Returns how many members were followed.
@@ -191,7 +189,7 @@ def _price_next(model, candidates, k, u, begun, ends, tile, space, price):
     run = candidates.run[k]
     remembers = law_remembers(run[CODE])
     grids, i, j, _ = tile
-    _, lists, spans, _ = space
+    _, lists, spans, _ = buffers
     step, told, count, shared, modes, sets, todo, _, _, _, _ = lists
     followed = run[MODES] == FOLLOWED
     kind = candidates.step[run[FIRST_STEP] + u, KIND] if followed else np.int64(POINT)
@@ -234,7 +232,7 @@ def _price_next(model, candidates, k, u, begun, ends, tile, space, price):
     done = 0.0
     for smallest in range(PARTS):
         if todo[smallest] != 0 and smallest * SHORT < width:
-            done += _follow_each(model, candidates, k, u, begun, ends, smallest, tile, space, price)
+            done += _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, price)
             changed = changed or (remembers and kind == WHOLE)
     if changed:
         _share(modes[0], sets[0], height, shared)
@@ -307,19 +305,19 @@ def _load_all(model, candidates, k, grids, i, j, whole):
 
 
 @kernel
-def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, space, price):
+def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, price):
     """Follow the members of one of the smallest parts through a step.
 
     Where permanent sets become others, what is listed is priced first, with those that were.
 
-    model, candidates, k, u, begun, ends, tile, space, price: as of `_price_next`.
+    model, candidates, k, u, begun, ends, tile, buffers, price: as of `_price_next`.
     smallest: the number of the part among those of its level.
 
     Returns how many members there are.
     """
     run = candidates.run[k]
     grids, i, j, _ = tile
-    _, lists, _, room = space
+    _, lists, _, following = buffers
     _, _, _, _, modes, sets, todo, _, fresh, whole, _ = lists
     height, width = extent(grids, i, j)
     if todo[LOADED] == 0:
@@ -338,7 +336,7 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, space, pr
         at = a * BROAD + first
         if run[MODES] == PIECES:
             o = run[FIRST_STATE] + u
-            works = room[3][0]
+            works = following[3][0]
             member_works(model, PLACES + at, wide, candidates.pose[o, 0], candidates.change[o, 0], works)
             own = model.member[MEMBER_FREE_LENGTH, PLACES + at : PLACES + at + wide]
             t = candidates.when[o]
@@ -355,12 +353,12 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, space, pr
             continue
         row = slice(at, at + wide)
         price_step(
-            model, candidates, k, PLACES + at, wide, s, modes[0, row], sets[0, row], begun, yes, room, price[row]
+            model, candidates, k, PLACES + at, wide, s, modes[0, row], sets[0, row], begun, yes, following, price[row]
         )
         if remembers:
             for b in range(wide):
-                modes[to, at + b] = room[4][1, b]
-                fresh[at + b] = room[5][1, b]
+                modes[to, at + b] = following[4][1, b]
+                fresh[at + b] = following[5][1, b]
                 changed = changed or fresh[at + b] != sets[0, at + b]
     followed = 1.0 * height * wide
     if not remembers or kind == POINT:
@@ -368,7 +366,7 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, space, pr
     if changed and kind == WHOLE and last_column == first + SHORT:
         for level in range(LEVELS):
             part = (1 << level) - 1 + first // (BROAD >> level)
-            followed += _price_list(model, candidates, k, part, tile, space, price)
+            followed += _price_list(model, candidates, k, part, tile, buffers, price)
     for a in range(height):
         for b in range(first, last_column):
             sets[to, a * BROAD + b] = fresh[a * BROAD + b]
@@ -376,16 +374,16 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, space, pr
 
 
 @kernel
-def _price_list(model, candidates, k, part, tile, space, price):
+def _price_list(model, candidates, k, part, tile, buffers, price):
     """Price the steps that are listed for a part, which has none in its list then.
 
-    model, candidates, k, tile, space, price: as of `_price_next`.
+    model, candidates, k, tile, buffers, price: as of `_price_next`.
     part: its number.
 
     Returns how many prices of steps were computed.
     """
     grids, i, j, error = tile
-    scratch, lists, _, room = space
+    scratch, lists, _, following = buffers
     _, _, count, shared, _, sets, _, found, _, _, _ = lists
     plan, _, _, _, index, values, _ = scratch
     steps = count[part]
@@ -405,7 +403,7 @@ def _price_list(model, candidates, k, part, tile, space, price):
             members = number_candidates(i, j, scratch)
             load_members(model, candidates, k, index, members, np.int64(0))
             values[:members] = 0.0
-            _price_few(model, candidates, k, part, low + 0.5 * n * (high - low), members, lists, room, values)
+            _price_few(model, candidates, k, part, low + 0.5 * n * (high - low), members, lists, following, values)
             take_prices(grids, i, j, error, scratch, found[n])
         done += plan[PRICED]
     height, _ = extent(grids, i, j)
@@ -421,7 +419,7 @@ def _price_list(model, candidates, k, part, tile, space, price):
 
 
 @kernel
-def _price_few(model, candidates, k, part, kept, members, lists, room, values):
+def _price_few(model, candidates, k, part, kept, members, lists, following, values):
     """Add what some members do in the steps that are listed for a part.
 
     In:
@@ -433,7 +431,7 @@ def _price_few(model, candidates, k, part, kept, members, lists, room, values):
       lists: of `make_lists`.
     Out:
       values (members or more,): added to.
-      room: of `make_room`, overwritten.
+      following: of `make_following`, overwritten.
     """
     run = candidates.run[k]
     step, told, count, _, _, _, _, _, _, _, works = lists
@@ -446,12 +444,14 @@ def _price_few(model, candidates, k, part, kept, members, lists, room, values):
         known = told[part, n]
         s = run[FIRST_STEP] + step[part, n]
         if known <= LEAVES:
-            room[4][0] = LEAVES - known
-            room[5][0] = kept
+            following[4][0] = LEAVES - known
+            following[5][0] = kept
             for at in range(0, members, ROW):
                 wide = min(ROW, members - at)
                 few = values[at : at + wide]
-                price_step(model, candidates, k, at, wide, s, room[4][0], room[5][0], yes, yes, room, few)
+                price_step(
+                    model, candidates, k, at, wide, s, following[4][0], following[5][0], yes, yes, following, few
+                )
             continue
         o = run[FIRST_STATE] + step[part, n]
         behind = o + 1
@@ -468,7 +468,8 @@ def _price_few(model, candidates, k, part, kept, members, lists, room, values):
                     works[ELONGATION, m] -= kept
             if quick:
                 add_polynomial(
-                    run[CODE], p, model.curves, t, value, weight, works, members, known, room[0], room[1], values
+                    run[CODE], p, model.curves, t, value, weight, works, members, known, following[0], following[1],
+                    values,
                 )  # fmt: skip
             else:
                 add_in_mode(run[CODE], p, model.curves, t, value, weight, free, works, known, own)
