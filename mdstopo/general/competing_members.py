@@ -63,7 +63,7 @@ def members_peaks(
         return [row_of(t[-1], s[0], count - 1, 1.0, s[1], 1.0, i) for s, i in zip(seen, who.tolist(), strict=True)]
     seen_all = seen_all[who] if at_once else compare(driver, j, places, who, count)[1]
     seen_all = seen_all.reshape(len(who), count, len(fractions), 2)
-    limit = _least(top, window, most)
+    limit = _limit(top, least, most)
     plain = None
     if ends:
         seen_all, plain = _inside(driver, j, t, who, seen_all, limit)
@@ -134,13 +134,13 @@ def _inside(
     return found, plain
 
 
-def _least(top: FloatArray, window: float, most: int) -> float:
-    """The value below which no peak is among the `most` highest within the window, by the highest of each member (M,).
+def _limit(top: FloatArray, least: float, most: int) -> float:
+    """The value below which no peak is among the `most` highest that are at least `least`, by the highest of each
+    member (M,).
 
     So many members have a peak at least as high as the last of them. Samples lie beside the motion by what the steps'
     quintic is off.
     """
-    least = (1.0 - window) * float(top.max())
     if len(top) >= most:
         least = max(least, float(np.partition(top, -most)[-most]))
     return (1.0 - BESIDE) * least

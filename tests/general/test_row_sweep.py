@@ -170,6 +170,6 @@ def test_leaving_out_peaks_that_are_too_low_to_be_told_changes_none_that_is(aske
     evaluator = Evaluator(grid(30))
     design = evaluator.case.start * np.random.default_rng(2).uniform(0.3, 1.3, len(evaluator.case.start))
     found = evaluator.evaluate(design, False, rows=asked).peaks["F"]
-    monkeypatch.setattr(competing_members, "_least", lambda *_: -1e300)
+    monkeypatch.setattr(competing_members, "_limit", lambda *_: -1e300)
     every = evaluator.evaluate(design, False, rows=asked).peaks["F"]
     assert [peak[:2] for peak in found] == [peak[:2] for peak in every]
