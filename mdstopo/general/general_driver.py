@@ -1,6 +1,7 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +53,7 @@ from mdstopo.general.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.turning_drives import global_moments
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
-from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult
+from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult
 from mdstopo.integrators.steps import (
     CHATTERING,
     HALF_TURN,
@@ -83,6 +84,19 @@ ROWS = 6
 DAMPING = 1
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
+
+
+@dataclass(frozen=True)
+class Differentiated:
+    """gradients (n_obj, R, N) of the rows; message: what the user should know although it worked, or empty.
+
+    across: as gradients, of `evaluation.Peak.across`, or None.
+    """
+
+    status: Status
+    message: str
+    gradients: FloatArray
+    across: FloatArray | None = None
 
 
 class GeneralDriver:

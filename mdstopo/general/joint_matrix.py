@@ -402,7 +402,8 @@ def substitute(envelope, gram, diagonal, x):
 def _substitute_back(envelope, gram, x, end):
     """The last part of `substitute` for rows before `end` that begin at one column. Returns the first of these.
 
-    Of more than three such rows the last two are taken, so that sums do not depend on who takes three at once.
+    Of more than three such rows the last two are taken. So sums have the order that they have where rows are taken by
+    twos, and results keep their bits.
     """
     same = 1
     while same < 4 and same < end and envelope[end - 1 - same, 0] == envelope[end - 1, 0]:

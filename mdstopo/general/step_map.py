@@ -251,12 +251,12 @@ def carry_states(step, count, fresh, states):
     width = step.by_state.shape[0]
     columns = states.shape[1]
     flat = states.reshape(states.size)
-    room = fresh.reshape(fresh.size)
+    rows = fresh.reshape(fresh.size)
     vector = lanes()
     whole = columns - columns % vector
     for i in range(0, whole, vector):
         for b in range(width):
-            store(room, vector * b, load(flat, b * columns + i))
+            store(rows, vector * b, load(flat, b * columns + i))
         for d in range(0, count, 4):
             two, three, four = min(d + 1, width), min(d + 2, width), min(d + 3, width)
             first = zero()
@@ -264,20 +264,20 @@ def carry_states(step, count, fresh, states):
             third = zero()
             fourth = zero()
             for b in range(width):
-                x = load(room, vector * b)
+                x = load(rows, vector * b)
                 first += x * step.by_state[b, d]
                 second += x * step.by_state[b, two]
                 third += x * step.by_state[b, three]
                 fourth += x * step.by_state[b, four]
-            store(room, vector * (width + d), first)
-            store(room, vector * (width + d + 1), second)
-            store(room, vector * (width + d + 2), third)
-            store(room, vector * (width + d + 3), fourth)
+            store(rows, vector * (width + d), first)
+            store(rows, vector * (width + d + 1), second)
+            store(rows, vector * (width + d + 2), third)
+            store(rows, vector * (width + d + 3), fourth)
         for d in range(width):
-            store(flat, d * columns + i, load(room, vector * (width + d)))
+            store(flat, d * columns + i, load(rows, vector * (width + d)))
         if count > width:
             at = width * columns + i
-            store(flat, at, load(flat, at) + load(room, 2 * vector * width))
+            store(flat, at, load(flat, at) + load(rows, 2 * vector * width))
     for i in range(whole, columns):
         for d in range(count):
             value = 0.0

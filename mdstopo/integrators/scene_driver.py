@@ -69,19 +69,6 @@ class ResponseResult(NamedTuple):
     message: str = ""
 
 
-@dataclass(frozen=True)
-class Differentiated:
-    """gradients (n_obj, R, N) of the rows; message: what the user should know although it worked, or empty.
-
-    across: as gradients, of `evaluation.Peak.across`, or None.
-    """
-
-    status: Status
-    message: str
-    gradients: FloatArray
-    across: FloatArray | None = None
-
-
 class Scene(Protocol):
     """One load case as arrays; bodies: names in the order of the state; skipped: what was left out, and why.
 
