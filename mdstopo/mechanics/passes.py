@@ -57,8 +57,6 @@ SUMS = 22
 #: columns of them: the force and couple Q, the stored energy E and its slopes E_xi, K_xx and K_yy
 SUM_X, SUM_Y, SUM_T, STORED, SLOPE_X, SLOPE_Y, SLOPE_T, K_XX = range(8)
 K_YY = 11
-#: the first of K and C, which are made on demand
-FIRST_TANGENT = 7
 #: members times poses from which on threads are worth making: some 0.8 ms of work
 WORTH = 400_000
 

@@ -597,14 +597,3 @@ def _quintic(c, h, v0, a0, way, v1, a1):
     inner = plus(times(3.0, x3), times(c, plus(times(4.0, x4), times(5.0 * c, x5))))
     rate = plus(v0, times(c / h, plus(times(h * h, a0), times(c, inner))))
     return along, rate
-
-
-@part
-def turned_by(q, other):
-    """The largest angle (rad) between the attitudes of a body in two states."""
-    largest = 0.0
-    for body in range(q.shape[0] // COORDINATES):
-        i = COORDINATES * body + 3
-        t = turn_between(quaternion_at(q, i), quaternion_at(other, i))
-        largest = max(largest, dot(t, t) ** 0.5)
-    return largest
