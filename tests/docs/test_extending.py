@@ -52,6 +52,27 @@ def test_changes_are_made_where_their_surroundings_are() -> None:
             changed(text, block)
 
 
+def make_examples(folder: Path) -> None:
+    """Apply the blocks of the page to the project in a folder."""
+    for block in EXAMPLES:
+        place = folder / block.title
+        if block.language == "diff":
+            place.write_text(changed(place.read_text(encoding="utf-8"), block), encoding="utf-8")
+        elif block.title:
+            assert not place.exists(), block.title
+            place.write_text(block.text, encoding="utf-8")
+
+
+def test_every_change_of_the_page_fits_the_sources(tmp_path: Path) -> None:
+    for block in EXAMPLES:
+        source = ROOT / block.title
+        if block.title:
+            (tmp_path / block.title).parent.mkdir(parents=True, exist_ok=True)
+        if block.language == "diff" and source.exists():  # the others change what a block before has made
+            shutil.copy(source, tmp_path / block.title)
+    make_examples(tmp_path)
+
+
 def test_the_worked_examples_do_what_the_page_says(tmp_path: Path) -> None:
     copy = tmp_path / "project"
     ignored = shutil.ignore_patterns("__pycache__")
@@ -59,13 +80,7 @@ def test_the_worked_examples_do_what_the_page_says(tmp_path: Path) -> None:
         shutil.copytree(ROOT / name, copy / name, ignore=ignored)
     for name in ("pyproject.toml", "mkdocs.yml"):
         shutil.copy(ROOT / name, copy)
-    for block in EXAMPLES:
-        place = copy / block.title
-        if block.language == "diff":
-            place.write_text(changed(place.read_text(encoding="utf-8"), block), encoding="utf-8")
-        elif block.title:
-            assert not place.exists(), block.title
-            place.write_text(block.text, encoding="utf-8")
+    make_examples(copy)
     environment = {**os.environ, "PYTHONPATH": str(copy)}
     for words in JOINED:
         command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words]
