@@ -29,8 +29,7 @@ def held(entry: Entry, types: str) -> None:
 def hold_calls() -> None:
     """Have all calls of this process held to the table.
 
-    What the compiler makes lives on: Python is spared to look through it for what could go, while it is made (a
-    twentieth of the time to compile) and ever after.
+    What the compiler leaves in memory lives on: Python is spared to look through it for what could go.
     """
     ready, built = Entry._ready, Entry._built
 
@@ -39,14 +38,10 @@ def hold_calls() -> None:
         return ready(entry, types)
 
     def frozen(entry: Entry, path: Path, types: str) -> Any:
-        collects = gc.isenabled()
-        gc.disable()
         try:
             return built(entry, path, types)
         finally:
             gc.freeze()
-            if collects:
-                gc.enable()
 
     Entry._ready = checked  # type: ignore[method-assign,assignment]
     Entry._built = frozen  # type: ignore[method-assign]
