@@ -29,7 +29,14 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "cli/test_cli_commands.py": ("goes_on[2-", "goes_on[1-pareto"),
     "cli/test_finalize.py": ("a_fixed_step_is_verified",),
     "cli/test_plot_export_new.py": ("starter_case_is_right", "to_the_byte[pdf"),
-    "cli/test_surroundings.py": ("spelt[ascii", "spelt[latin"),
+    "cli/test_surroundings.py": (
+        "spelt[ascii",
+        "spelt[latin",
+        "Bad file descriptor-check a.yaml --json",
+        "Bad file descriptor-schema",
+        "No space left on device-check a.yaml]",
+        "No space left on device---version",
+    ),
     "compiler/test_cache_safety.py": ("damaged_files_of_the_cache",),
     "compiler/test_machine_code.py": (
         "does_not_depend_on_what_was_compiled_before",
@@ -163,6 +170,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "space/test_contacts_in_space.py": ("implicit", "collision", "gradients_through_contacts"),
     "space/test_driven_bodies.py": ("gradients_with_driven", "half_a_turn_in_a_step[628"),
     "space/test_gauss_in_space.py": ("windows", "gradient", "slopes", "tilted", "energy", "thousands"),
+    "space/test_gradients.py": ("springs_alone",),
     "space/test_gradients_in_space.py": ("",),
     "space/test_grids_of_springs.py": ("without_the_kernels", "gauss"),
     "space/test_half_turns_looked_at.py": ("without_an_error_estimate",),
