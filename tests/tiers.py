@@ -62,6 +62,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "docs/test_site.py": ("",),
     "engine/test_error_estimate.py": ("[generalized_alpha", "random_scenes[runge_kutta"),
     "engine/test_golden.py": ("[mooring", "[occupant", "[touchdown", "[restraint", "[tiedown", "[fig6-uncertain"),
+    "engine/test_reprs.py": ("mistake_for_type_checkers",),
     "engine/test_trajectories.py": (
         "integrator[several bodies-runge_kutta",
         "integrator[damped-gauss",
@@ -69,7 +70,6 @@ THOROUGH: dict[str, tuple[str, ...]] = {
         "integrator[kinks-gauss",
         "integrator[everything undamped",
     ),
-    "engine/test_reprs.py": ("mistake_for_type_checkers",),
     "fit/test_fits.py": ("intervals_hold_the_truth", "many_more_motions"),
     "front/test_cluster.py": ("dies_in_mid_sweep", "scheduler_that_dies", "a_sweep_runs_on"),
     "front/test_failures.py": ("beyond_a_constraint_are_off",),
@@ -198,8 +198,10 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "variables/test_names.py": ("place_is_differentiated[True",),
     "variables/test_parameters.py": (
         "generalized_alpha",
-        *(f"parameter_is_that_of_what_is_computed[{law}-jointed" for law in ("clipped", "cubic", "curve", "pulse")),
-        *(f"parameter_is_that_of_what_is_computed[{law}-jointed" for law in ("actuator", "drawn", "expression")),
+        *(
+            f"a_parameter_is_that_of_what_is_computed[{law}-jointed"
+            for law in ("clipped", "cubic", "curve", "pulse", "actuator", "drawn", "expression")
+        ),
     ),
     "variables/test_runs.py": ("the_catch",),
     "variables/test_settled.py": (
