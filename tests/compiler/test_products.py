@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from mdstopo.compiler.jit import inline, member_kernel, vector_entry
+from tests.sources import functions_of
 
 ROOT = Path(__file__).resolve().parents[2]
 #: what allows LLVM to order sums and products
@@ -31,9 +32,8 @@ def free_powers(source: str) -> list[str]:
     """Products of a module with a factor that stands there `OFTEN`, beside another one, where LLVM orders them."""
     return [
         ast.unparse(each)
-        for function in ast.walk(ast.parse(source))
-        if isinstance(function, ast.FunctionDef)
-        and any(isinstance(mark, ast.Name) and mark.id in FREE for mark in function.decorator_list)
+        for function in functions_of(source)
+        if any(isinstance(mark, ast.Name) and mark.id in FREE for mark in function.decorator_list)
         for each in ast.walk(function)
         if isinstance(each, ast.BinOp)
         for found in [factors(each)]

@@ -16,24 +16,19 @@ QUOTED = re.findall(r"^`([^`]+)`$", (DOCS / "troubleshooting.md").read_text(enco
 SHORTEST, PART = 9, 8
 
 
-def texts(tree: ast.AST) -> Iterator[str]:
+def texts(source: str) -> Iterator[str]:
     """The texts of a module without its docstrings; `...` stands for what varies, backquotes are left out."""
-    for node in ast.walk(tree):
+    docstrings: set[ast.AST] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node, clean=False):
+            docstrings.update(ast.iter_child_nodes(node.body[0]))
         parts: list[object] = []
-        if isinstance(node, ast.Constant):
+        if isinstance(node, ast.Constant) and node not in docstrings:
             parts = [node.value]
         elif isinstance(node, ast.JoinedStr):
             parts = [getattr(part, "value", None) for part in node.values]
         if parts:
             yield "".join(part if isinstance(part, str) else "..." for part in parts).replace("`", "")
-
-
-def without_docstrings(source: str) -> ast.AST:
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node) is not None:
-            node.body = node.body[1:]
-    return tree
 
 
 @cache
@@ -42,7 +37,7 @@ def sources() -> str:
     return "\n".join(
         text.replace("\n", " ")
         for path in sorted((ROOT / "mdstopo").rglob("*.py"))
-        for text in texts(without_docstrings(path.read_text(encoding="utf-8")))
+        for text in texts(path.read_text(encoding="utf-8"))
     )
 
 

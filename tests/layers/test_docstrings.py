@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from tests.sources import functions_of
+
 ROOT = Path(__file__).resolve().parents[2]
 #: a function with more arguments than this names them in its docstring
 FEW = 5
@@ -39,12 +41,12 @@ def interface(name: str) -> list[ast.FunctionDef]:
 
 def unnamed(source: str) -> Iterator[tuple[int, str, list[str]]]:
     """Line and name of each function with many arguments, and those that its docstring does not name as words."""
-    for function in ast.walk(ast.parse(source)):
-        if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            names = arguments(function)
+    for function in functions_of(source):
+        names = arguments(function)
+        if len(names) > FEW:
             words = set(re.findall(r"\w+", ast.get_docstring(function) or ""))
             missing = [name for name in names if name not in words]
-            if len(names) > FEW and missing and not described(function):
+            if missing and not described(function):
                 yield function.lineno, function.name, missing
 
 

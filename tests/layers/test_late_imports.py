@@ -6,6 +6,8 @@ from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
 
+from tests.sources import functions_of, statements
+
 ROOT = Path(__file__).resolve().parents[2]
 Late = tuple[str, str]
 #: an import inside something: most modules have none and need not be parsed
@@ -32,10 +34,8 @@ def late() -> tuple[Late, ...]:
         source = path.read_text(encoding="utf-8")
         if not INDENTED.search(source):
             continue
-        for function in ast.walk(ast.parse(source)):
-            if not isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
-                continue
-            for node in ast.walk(function):
+        for function in functions_of(source):
+            for node in statements(function):
                 file = path.relative_to(ROOT).as_posix()
                 if isinstance(node, ast.Import):
                     found += [(file, name.name) for name in node.names]

@@ -4,6 +4,8 @@ import ast
 import re
 from fnmatch import fnmatch
 
+from tests.sources import functions_of
+
 from .test_imports import ROOT
 
 #: lines of a screen, without those of a docstring
@@ -22,12 +24,11 @@ def listed() -> list[tuple[list[str], list[str]]]:
 def long_functions(source: str) -> list[str]:
     """The names of functions of a module that are longer than a screen."""
     found = []
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            docstring = (ast.get_docstring(node, clean=False) or "").count("\n") + 1
-            assert node.end_lineno is not None
-            if node.end_lineno - node.lineno + 1 - docstring > SCREEN:
-                found.append(node.name)
+    for node in functions_of(source):
+        docstring = (ast.get_docstring(node, clean=False) or "").count("\n") + 1
+        assert node.end_lineno is not None
+        if node.end_lineno - node.lineno + 1 - docstring > SCREEN:
+            found.append(node.name)
     return found
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from documentation.layers import IMAGE, ROWS, drawn
+from tests.sources import statements_in
 
 from .test_imports import ROOT
 
@@ -28,7 +29,7 @@ def imports(path: Path) -> Iterator[str]:
             continue
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("mdstopo."):
             yield str(node.module)
-        waiting += ast.iter_child_nodes(node)
+        waiting += statements_in(node)
 
 
 def test_every_module_has_a_box() -> None:

@@ -86,9 +86,9 @@ def test_what_is_counted_and_what_is_not_is_told():
 
 
 def test_each_load_case_has_the_limits_of_its_own():
-    limit = peak("displacement", limit=0.1)
+    limit = peak("displacement", "x", "max_abs", limit=0.1)
     cases = {"slow": {"time": {"end": 0.04}}, "long": {}}
-    aims = {"A": peak("acceleration", load_case="slow"), "B": peak("acceleration", load_case="long")}
+    aims = {name: peak("acceleration", "x", "max_abs", load_case=case) for name, case in (("A", "slow"), ("B", "long"))}
     rows = [limit | {"load_case": "slow"}, limit | {"load_case": "long", "limit": 0.2}]
     found = bounds(case_of(load={"velocity": [2, 0]}, load_cases=cases, objectives=aims, constraints=rows))
     assert found["A"].value == 0.0  # 0.08 m in all, without any force
@@ -142,7 +142,8 @@ def named(what, **sections):
     scene = sled([[0, 0], [0.1, 30], [0.2, 0]])
     scene["define"] = {"k": 4000}
     scene["design"] = {"variables": {"size": {"of": "define.k", "lower": 1000, "upper": 9000}}}
-    scene["constraints"] = [peak("displacement", relative_to="sled", limit=0.1)]
+    scene["constraints"] = [peak("displacement", "x", "max_abs", relative_to="sled", limit=0.1)]
+    scene["objectives"] = {"G": peak("acceleration", "x", "max_abs")}
     if what == "mass":
         scene["bodies"]["load"] |= {"mass": "=k / 400"}
     else:
@@ -152,7 +153,8 @@ def named(what, **sections):
 
 def test_a_name_that_decides_numbers_of_laws_alone_leaves_the_bound_as_it_is():
     plain = sled([[0, 0], [0.1, 30], [0.2, 0]])
-    plain["constraints"] = [peak("displacement", relative_to="sled", limit=0.1)]
+    plain["constraints"] = [peak("displacement", "x", "max_abs", relative_to="sled", limit=0.1)]
+    plain["objectives"] = {"G": peak("acceleration", "x", "max_abs")}
     expected = bounds(case_of(**plain))["G"]
     found = bounds(named({"type": "spring", "stiffness": "=k", "damping": "=k / 200"}))["G"]
     assert expected.value is not None

@@ -250,7 +250,7 @@ def _least(problem, rounds=1_500):
             best = max(best, found)
         Eg = E @ g
         size = float(np.sqrt(g @ Eg))
-        if size < 1e-9 * scale:
+        if y.min() >= 0.0 and size < 1e-7 * abs(best):  # the bound cannot be higher than this one by more
             break
         y = y + Eg / size / 4.0
         E = 9.0 / 8.0 * (E - 0.5 * np.outer(Eg, Eg) / size**2)

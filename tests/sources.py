@@ -1,0 +1,31 @@
+"""What tests read out of the sources of the package."""
+
+import ast
+from collections.abc import Iterator
+
+
+def statements_in(node: ast.AST) -> Iterator[ast.AST]:
+    """The statements right inside of a module, a definition or a compound statement, with what begins its branches.
+
+    Expressions are left out: most of a tree consists of them, and they define and import nothing.
+    """
+    for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+        inside = getattr(node, name, None)
+        if isinstance(inside, list):
+            yield from inside
+
+
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """A module or statement, and all statements inside of it."""
+    waiting = [node]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting += statements_in(node)
+
+
+def functions_of(source: str) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """All functions of a module, methods and those inside others among them."""
+    for node in statements(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node
