@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.general_model import SUBJECT, unpack_general
 from mdstopo.general.general_responses import (
@@ -62,6 +62,15 @@ def finished(model, tables, member_state, history, count, work):
     )  # fmt: skip
 
 
+@part
+def goes_on(history, k):
+    """Whether no law, load or mode changes between step k, which is not the first one, and the step before."""
+    return (
+        history.index[k, SEGMENT] == history.index[k - 1, SEGMENT]
+        and history.index[k, EVENTS] == history.index[k - 1, EVENTS]
+    )
+
+
 @kernel
 def known_at(tag, history, count, k, e):
     """The number of the stage whose accelerations are those at the start (e = 0) or the end (e = 1) of step k; -1
@@ -75,11 +84,7 @@ def known_at(tag, history, count, k, e):
     """
     if not is_explicit(tag) or k + e >= count:
         return -1
-    same = (
-        history.index[k + e, SEGMENT] == history.index[k, SEGMENT]
-        and history.index[k + e, EVENTS] == history.index[k, EVENTS]
-    )
-    return history.index[k + e, FIRST] if same else -1
+    return history.index[k + e, FIRST] if e == 0 or goes_on(history, k + e) else -1
 
 
 @kernel

@@ -27,8 +27,7 @@ from mdstopo.general.gauss_window import (
     solve_nodes,
     spread_balance,
 )
-from mdstopo.general.general_model import KIND, unpack_general
-from mdstopo.general.general_responses import ENERGY
+from mdstopo.general.general_model import ENERGY, KIND, unpack_general
 from mdstopo.general.generalized_alpha_step import rate_of
 from mdstopo.general.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
 from mdstopo.general.run_start import motion_at_start
@@ -181,7 +180,7 @@ def is_steady(model, segment):
 
 
 @kernel
-def predict(model, planes, h, o, history, nodes):
+def predict(model, planes, h, o, workspace, history, nodes):
     """First guess of a window: the motion under the forces at its start alone, with linear forces as they are there.
 
     Constant:
@@ -189,12 +188,13 @@ def predict(model, planes, h, o, history, nodes):
       planes (7, s_max, s_max): of `gauss_tables`, for the first number of nodes.
       h: length of the window (s).
       o: number of the window's first stage.
+      workspace: the workspace, for its switches.
     In and out:
       nodes: rows start and ahead, and the balance of node 0, are read.
       history: the history of steps, whose stages of the window are scratch.
     """
     s = COUNTS[FIRST_LEVEL]
-    spread_balance(model, history, o, s, nodes)
+    spread_balance(model, history, o, s, workspace, nodes)
     for i in range(s):
         for d in range(nodes.x.shape[1]):
             nodes.ref_x[i, d] = 0.0
@@ -444,7 +444,7 @@ def _solve_window(
         nodes.when[0] = t + 0.5 * h
         one = np.int64(1)
         balance_nodes(model, member_state, segment, one, np.bool_(False), q0, rel0, workspace, history, o, nodes, work)
-    predict(model, planes, h, o, history, nodes)
+    predict(model, planes, h, o, workspace, history, nodes)
     turned = widest_turn(model, nodes.x[s - 1])
     if turned >= 3.0 and fixed_step <= 0.0:
         return NEWTON_FAILED, s, h / turned

@@ -15,6 +15,7 @@ from mdstopo.general.gauss_window import (
     add_changes,
     add_rate_products,
     fill_slopes,
+    has_rates,
     is_coupled,
     moving,
     pull_changes,
@@ -141,6 +142,12 @@ def is_continuous(tag):
 @kernel
 def is_explicit(tag):
     """Whether stages follow from those before them: windows of collocation are implicit."""
+    return False
+
+
+@kernel
+def ends_in_stage(tag):
+    """Whether the last stage of a step is its end: Gauss's nodes lie inside."""
     return False
 
 
@@ -334,12 +341,17 @@ def _row_back(
         combine_rows(back_x, s, s, h * h, rhs, room[7], value)
         combine_rows(back_y, s, s, h, value, room[8], rhs)
     take_rows(rhs, s, x)
+    rates = has_rates(model, workspace)
+    take_rows(none, s, bar_y)
     last = np.inf
     for _ in range(MOST_SWEEPS):
         work[SWEEPS] += 1
         _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change, bar_x, bar_y)
-        combine_rows(back_y, s, s, h, rhs, bar_y, value)
-        moved, size = renew_rows(back_x, s, h * h, value, bar_x, root, x)
+        if rates:
+            combine_rows(back_y, s, s, h, rhs, bar_y, value)
+            moved, size = renew_rows(back_x, s, h * h, value, bar_x, root, x)
+        else:
+            moved, size = renew_rows(back_x, s, h * h, rhs, bar_x, root, x)
         if moved <= 4e-16 * size or (moved >= last and moved <= 1e-13 * size):
             break
         last = moved
@@ -385,10 +397,12 @@ def _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change
       inverse (n,): inverse masses; 0 of ground. maps (s, n_body, MAPS), dense (2, s, M, W): of the nodes, by rows.
       none (s, W): zeros. x (s, W): cotangents of u.
     Out:
-      bar_x, bar_y: overwritten. change (5, n): scratch.
+      bar_x, bar_y: overwritten; bar_y stays as it is where G does not depend on y. change (5, n): scratch.
     """
     if dense.shape[2] > 0:
         add_products(dense[0], x, s, none, bar_x)
+        if not has_rates(model, workspace):
+            return
         take_rows(none, s, bar_y)
         add_rate_products(model, dense[1], x, s, is_coupled(model, workspace), bar_y)
         return
@@ -484,7 +498,8 @@ def _row_forward(model, planes, history, w, c, workspace, inverse, maps, dense, 
         integrate_to_nodes(planes[1], s, s, h, ends[0], none[0], planes[0, 0], du, by_y)
         if dense.shape[2] > 0:
             add_products(dense[0], by_x, s, given, value)
-            add_rate_products(model, dense[1], by_y, s, is_coupled(model, workspace), value)
+            if has_rates(model, workspace):
+                add_rate_products(model, dense[1], by_y, s, is_coupled(model, workspace), value)
         else:
             take_rows(given, s, value)
             for i in range(s):
@@ -545,5 +560,6 @@ implement(
     derivatives=derivatives,
     is_continuous=is_continuous,
     is_explicit=is_explicit,
+    ends_in_stage=ends_in_stage,
     weights_of=weights_of,
 )
