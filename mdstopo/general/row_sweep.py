@@ -4,8 +4,8 @@ All rows go through the steps together, so what a step needs (tangents, factors,
 read or formed once for all of them; each row joins at its own step. A point inside a step that needs a step of its own
 (`method_interface`) is gone through by its row alone before it joins.
 
-Short steps are gone through first, and the members at all of their stages gathered in one pass: of steps with one stage
-each that pass would else cost little more than being called.
+Of few rows, short steps are gone through first, and the members at all of their stages gathered in one pass: a pass for
+each step of one stage would cost little more than being called.
 
 A step is linear in the cotangents. Where there are more rows than free coordinates and velocities, these go through it
 one by one, as unit cotangents, and each row is the sum of what became of them: however many rows there are, a step
@@ -30,8 +30,8 @@ from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_h
 from mdstopo.general.step_linear import free_places
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
-#: stages of a step that is short, and how many stages of such steps are gathered at once
-SHORT, GATHERED = 3, 64
+#: stages of a step that is short, how many stages of such steps are gathered at once, and of how many rows at most
+SHORT, GATHERED, FEW = 3, 64, 16
 
 
 class Units(NamedTuple):
@@ -292,8 +292,9 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
             )  # fmt: skip
         begins[m] = w
     units = make_units(model, total, out.shape[1])
-    plain = history.index[count, EVENTS] == 0 and model.varied.shape[0] == 0 and bar_set.shape[1] == 0
-    gathered = np.empty((total if plain else 0, GATHERED, n))
+    gathers = total <= FEW and history.index[count, EVENTS] == 0
+    gathers = gathers and model.varied.shape[0] == 0 and bar_set.shape[1] == 0
+    gathered = np.empty((total if gathers else 0, GATHERED, n))
     w = begins[0] if total > 0 else -1
     active = 0
     while w >= 0:
@@ -309,7 +310,7 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
             )
             w = history.index[w, PARENT]
             continue
-        if plain and is_short(history, w):
+        if gathers and is_short(history, w):
             stop = begins[active] + 1 if active < total else np.int64(0)
             w = short_steps_of_rows(
                 tag, model, tables, member_state, history, w, stop, fraction[:active], lam_q[:active], lam_v[:active],

@@ -53,20 +53,20 @@ def test_values_and_gradients_agree(over_time):
     assert np.abs(found.gradients[0, 0] - gradient).max() <= 1e-8 * max(float(np.abs(gradient).max()), 1e-12)
 
 
-@pytest.mark.parametrize("step", [0.003, 0.01])
+@pytest.mark.parametrize("step", [0.008, 0.03])
 def test_short_steps_give_the_same_rows_and_sum_no_member_at_their_ends_anew(step):
-    """Some peaks and their gradients, of more steps than are gathered at once and of fewer."""
-    settings = {"solver.integrator": "generalized_alpha", "solver.step": str(step), "time.end": "0.6"}
-    case = read_case(CASE, overrides=settings)
+    """Four peaks and their gradients, of more steps than are gathered at once and of fewer."""
+    settings = {"solver.integrator": "generalized_alpha", "solver.step": str(step), "time.end": "1.5"}
+    case = read_case(CASE.replace("damping: 30, ", ""), overrides=settings)
     rows = Rows(window=1.0, most=4)
     expected = Evaluator(case).evaluate(case.initial, rows=rows).peaks["G"]
-    general = Evaluator(case, beyond="a comparison").evaluate(case.initial, rows=rows)
-    assert len(expected) > 1
-    for one, other in zip(general.peaks["G"], expected, strict=True):
+    general = Evaluator(case, beyond="a comparison")
+    assert len(expected) == 4
+    for one, other in zip(general.evaluate(case.initial, rows=rows).peaks["G"], expected, strict=True):
         assert one.value == pytest.approx(other.value, rel=1e-9)
         assert np.abs(one.gradient - other.gradient).max() <= 1e-8 * np.abs(other.gradient).max()
-    assert general.work["sums_of_samples"] <= 2 + 5 * len(expected)  # both ends, and inside steps with a peak
-    assert general.work["steps"] >= 60
+    work = general.evaluate(case.initial).work
+    assert work["sums_of_samples"] < 0.5 * work["steps"]  # both ends, and inside steps with the highest peak
 
 
 def test_how_far_bodies_may_move_for_displacements_to_tell_is_that_of_springs_alone():
