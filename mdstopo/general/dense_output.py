@@ -55,10 +55,14 @@ def finished(model, tables, member_state, history, count, work):
     n_q = model.q0.shape[0]
     n = model.mass.shape[0]
     n_row = model.size[0]
+    # few arrays with many rows: each of its own would take as long as a short step
+    places = np.empty((4, n_q))
+    vectors = np.zeros((8, n))
+    multipliers = np.zeros((3, n_row))
     return Motion(
-        model, tables, member_state, history, count, work, make_workspace(model), np.empty(n_q), np.empty(n),
-        np.zeros(n), np.zeros(n_row), np.empty((3, n)), np.empty(n_row), np.empty(n_q), np.empty((3, n)),
-        np.empty(n_row), np.empty((2, n_q)), np.empty((2, 2, n)),
+        model, tables, member_state, history, count, work, make_workspace(model), places[0], vectors[0], vectors[1],
+        multipliers[0], vectors[2:5], multipliers[1], places[1], vectors[5:8], multipliers[2], places[2:4],
+        np.empty((2, 2, n)),
     )  # fmt: skip
 
 

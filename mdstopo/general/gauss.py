@@ -262,16 +262,20 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     workspace = make_workspace(model)
     nodes = make_nodes(model)
     m = moving(model)
-    weight = np.zeros(nodes.x.shape[1])
+    rows = np.zeros((3, nodes.x.shape[1]))
+    weight = rows[0]
+    end = rows[1:3]
     weights = np.empty(model.mass.shape[0])
     lam = np.zeros(model.size[0])
-    end = np.zeros((2, nodes.x.shape[1]))
-    rel0 = np.empty((n_pair, pose_size(model)))
-    before = np.empty((n_pair, pose_size(model)))
-    after = np.empty((n_pair, pose_size(model)))
-    motion = np.zeros(n_pair)
-    noise = np.empty(n_pair)
-    scale = np.empty(n_pair)
+    poses = np.empty((3, n_pair, pose_size(model)))
+    rel0 = poses[0]
+    before = poses[1]
+    after = poses[2]
+    of_pairs = np.zeros((4, n_pair))
+    motion = of_pairs[0]
+    noise = of_pairs[1]
+    scale = of_pairs[2]
+    shortest = of_pairs[3]
     q0 = model.q0.copy()
     v0 = model.v0.copy()
     times = model.times
@@ -295,7 +299,6 @@ def windows(model, tables, member_state, settings, most, history, work, where):
         copy_vector(history.C[0].reshape(workspace.c.size), workspace.c.reshape(workspace.c.size))
     balanced = is_steady(model, np.int64(0))  # whether node 0 has the balance that the next prediction begins with
     motion_at_start(model, member_state, workspace, rel0, v0, scale, motion, noise)
-    shortest = np.empty(n_pair)
     shortest_at_start(model, rel0, shortest)
     last_time = times[times.shape[0] - 1]
     span = last_time - t

@@ -76,8 +76,9 @@ def state_at(model, history, w, c, x, y, q, v):
       x, y (n,): of the window. q (n_q,), v (n,): coordinates and velocities.
     """
     o, s, h = stages_of(history, w)
-    first = np.empty(s)
-    second = np.empty(s)
+    integral = np.empty((2, s))
+    first = integral[0]
+    second = integral[1]
     _polynomials(c, s, first, second)
     for d in range(moving(model)):
         x[d] = h * c * history.v[w, d]
@@ -104,8 +105,8 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
 
     Not needed here: tag, tables, member_state, count, keep, workspace, work.
     """
-    n = v.shape[0]
-    state_at(model, history, k, c, np.empty(n), np.empty(n), q, v)
+    inside = np.empty((2, v.shape[0]))
+    state_at(model, history, k, c, inside[0], inside[1], q, v)
     return k
 
 
@@ -122,8 +123,8 @@ def state_at_offset(tag, model, history, k, c, e, q, v, a, q_out, v_out):
 
     Not needed here: tag; q, v, a, which are those at c.
     """
-    n = v.shape[0]
-    state_at(model, history, k, c + e / (history.t[k + 1] - history.t[k]), np.empty(n), np.empty(n), q_out, v_out)
+    inside = np.empty((2, v.shape[0]))
+    state_at(model, history, k, c + e / (history.t[k + 1] - history.t[k]), inside[0], inside[1], q_out, v_out)
 
 
 @kernel
@@ -269,8 +270,9 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
     root = np.zeros(width)
     for d in range(m):
         root[d] = np.sqrt(inverse[d])
-    back_x = np.empty((s, s))  # the integrations, transposed
-    back_y = np.empty((s, s))
+    back = np.empty((2, s, s))  # the integrations, transposed
+    back_x = back[0]
+    back_y = back[1]
     for i in range(s):
         for j in range(s):
             back_x[j, i] = planes[2][i, j]
@@ -320,14 +322,17 @@ def _row_back(
     value = room[4]
     none = room[5]
     spread = bars.shape[0] > 0
-    beta_x = np.zeros(s)
-    beta_y = np.zeros(s)
-    at = np.zeros(n)
+    beta = np.zeros((2, s))
+    beta_x = beta[0]
+    beta_y = beta[1]
     here = np.zeros((model.home.shape[0], window_size(model)))
-    change = np.zeros((5, n))
+    vectors = np.zeros((9, n))
+    change = vectors[0:5]
+    point = vectors[5:7]
+    at = vectors[7]
+    start = vectors[8]
     _weights_at(planes, s, c, beta_x, beta_y)
     _maps_at(model, history, w, c, beta_x, beta_y, at, here)
-    point = np.zeros((2, n))
     window_vjp(model, here, lam_q, lam_v, change[2], point[0], point[1])
     for j in range(s):
         for d in range(m):
@@ -356,7 +361,6 @@ def _row_back(
             break
         last = moved
     _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change, bar_x, bar_y)
-    start = np.zeros(n)
     window_start_vjp(model, at, lam_q, start)
     for d in range(m):
         lam_v[d] = point[1, d] + h * c * point[0, d]

@@ -60,9 +60,10 @@ def make_units(model, rows, columns):
     n = model.mass.shape[0]
     place = free_places(model)
     many = 2 * place.shape[0] if rows > 2 * place.shape[0] else 0
+    both = np.empty((2, many, n))
     return Units(
-        place, np.empty((many, n)), np.empty((many, n)), np.zeros((many, 2, n)),
-        np.empty((many, count_sets(model))), np.empty((many, 17, n)), np.empty((many, columns)), np.ones(many),
+        place, both[0], both[1], np.zeros((many, 2, n)), np.empty((many, count_sets(model))),
+        np.empty((many, 17, n)), np.empty((many, columns)), np.ones(many),
     )  # fmt: skip
 
 
@@ -270,8 +271,9 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
     total = rows.shape[0]
     bars = np.empty((3, n))
     bar_set = np.zeros((total, count_sets(model)))
-    lam_q = np.zeros((total, n))
-    lam_v = np.zeros((total, n))
+    both = np.zeros((2, total, n))
+    lam_q = both[0]
+    lam_v = both[1]
     lam_x = np.zeros((total, 2, n))
     begins = np.empty(total, np.int64)
     fraction = np.ones(total)
