@@ -251,9 +251,10 @@ class Evaluator:
         The first evaluation with gradients and the first one without take one load case after the other: either may
         have to compile.
         """
+        if self.threads < 2 or len(self._seen) < 2 or self._may_be_coarse:
+            return {}
         took = {name: self._took.get((name, exact), 0.0) for name, _, _ in self._seen}
-        pays = self.threads > 1 and len(took) > 1 and min(took.values()) > 0.0 and not self._may_be_coarse
-        if not pays or sorted(took.values())[-2] < WORTH_A_THREAD:
+        if not min(took.values()) > 0.0 or sorted(took.values())[-2] < WORTH_A_THREAD:
             return {}
         calls = {name: partial(self._timed, name, driver, design, exact, rows) for name, _, driver in self._seen}
         longest_first = sorted(calls, key=took.__getitem__, reverse=True)

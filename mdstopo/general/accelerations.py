@@ -134,6 +134,9 @@ def make_workspace(model):
     tangents = room[slopes:].reshape((2, n // freedoms(model), shift_size(model)))
     shift_tangents(model, model.q0, model.q0, tangents[NO_SHIFT])
     inverse = inverse_masses(model)
+    solved = model.size[0]
+    for d in range(n):
+        solved += model.free[d]
     return Workspace(
         room[:turned].reshape((model.home.shape[0], attitude(model))),
         room[turned:rel].reshape((n_pair, pose_size(model))),
@@ -148,10 +151,10 @@ def make_workspace(model):
         room[phi:gamma].reshape((n_joint, rows)),
         room[jac:by_q].reshape((n_joint, rows, both)),
         room[by_q:by_v].reshape((n_joint, rows, both)),
-        np.empty((total, 3 * model.size[1] + 1)),
-        np.zeros(total, np.int64),
+        np.empty((solved, 3 * model.size[1] + 1)),
+        np.zeros(solved, np.int64),
         room[gram:x],
-        np.ones(total),
+        _scales(model),
         inverse,
         spread_masses(model, inverse),
         room[by_v:pull].reshape((n_joint, rows, both)),
@@ -166,6 +169,16 @@ def make_workspace(model):
         room[x:slopes].reshape((stages, n)),
         tangents,
     )
+
+
+@kernel
+def _scales(model):
+    """(n_place,): of the free coordinates, which make their diagonal about 1; 1 of all others."""
+    scale = np.ones(model.unknown_index.shape[0])
+    for d in range(model.mass.shape[0]):
+        if model.free[d] != 0:
+            scale[model.unknown_index[d]] = 1.0 / np.sqrt(model.mass[d])
+    return scale
 
 
 @part
@@ -263,8 +276,6 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, tangents, transp
     damped = workspace.switches[DAMPED] != 0
     band[:] = 0.0
     scale = workspace.scale
-    for d in range(n):
-        scale[model.unknown_index[d]] = 1.0 / np.sqrt(model.mass[d]) if model.free[d] != 0 else 1.0
     for j in range(model.joint.shape[0]):
         for r in range(most_rows(model)):
             if model.row[j, r] >= 0:
@@ -275,9 +286,11 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, tangents, transp
                         size += workspace.jac[j, r, i] ** 2 / model.mass[column]
                 scale[model.unknown_index[n + model.row[j, r]]] = 1.0 / np.sqrt(size) if size > 0.0 else 1.0
     for d in range(n):
+        if model.free[d] == 0:
+            continue
         p = model.unknown_index[d]
         band[p, half] = 1.0
-        if tangent and model.free[d] != 0:
+        if tangent:
             for r in range(rotations(model)):
                 angle = place_of_turn(model, d, r)
                 slope = turn_slope_by_shift(model, turn, d, r, tangents, d // freedoms(model))
@@ -287,22 +300,29 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, tangents, transp
                 angle = place_of_turn(model, d, r - rotations(model))
                 if model.free[angle] != 0 and turn[d, r] != 0.0:
                     put(band, half, scale, p, model.unknown_index[angle], -w_v * turn[d, r], transposed)
+    each = freedoms(model)
+    inertial = workspace.switches[DIAGONAL] == 0
     for p in range(model.pair.shape[0]):
-        for i in range(pair_freedoms(model)):
-            row = place_in_pair(model, p, i)
-            if model.free[row] == 0:
-                continue
-            for j in range(pair_freedoms(model)):
-                column = place_in_pair(model, p, j)
-                if model.free[column] == 0:
+        for block in range(4):
+            first = each * (block // 2)
+            second = each * (block % 2)
+            body = model.pair[p, block % 2]
+            row = each * model.pair[p, block // 2]
+            column = each * body
+            for i in range(each):
+                if model.free[row + i] == 0:
                     continue
-                value = mass[p, i, j]
-                if tangent:
-                    value += w_q * slope_by_shift(model, k, p, i, j, tangents, column // freedoms(model))
-                    if damped:
-                        value += w_v * c[p, i, j]
-                if value != 0.0:
-                    put(band, half, scale, model.unknown_index[row], model.unknown_index[column], value, transposed)
+                at = model.unknown_index[row + i]
+                for j in range(each):
+                    if model.free[column + j] == 0:
+                        continue
+                    value = mass[p, first + i, second + j] if inertial else 0.0
+                    if tangent:
+                        value += w_q * slope_by_shift(model, k, p, first + i, second + j, tangents, body)
+                        if damped:
+                            value += w_v * c[p, first + i, second + j]
+                    if value != 0.0:
+                        put(band, half, scale, at, model.unknown_index[column + j], value, transposed)
     for j in range(model.joint.shape[0]):
         for r in range(most_rows(model)):
             own = model.row[j, r]

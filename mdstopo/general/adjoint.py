@@ -20,9 +20,8 @@ from mdstopo.general.accelerations import (
 from mdstopo.general.extremes import FRACTION, RATE, STEP, WHO
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
-from mdstopo.general.general_model import KIND, SUBJECT
+from mdstopo.general.general_model import KIND, MEMBER_FORCE, SUBJECT
 from mdstopo.general.general_responses import (
-    MEMBER_FORCE,
     across_rate,
     across_slopes,
     chosen_part,

@@ -11,8 +11,7 @@ import numpy as np
 
 from mdstopo.case.over_time import ReductionKind
 from mdstopo.general.extremes import FRACTIONS, row_of
-from mdstopo.general.general_model import COUNT, GROUP, OFFSET, SUBJECT
-from mdstopo.general.general_responses import MEMBER_FORCE
+from mdstopo.general.general_model import COUNT, GROUP, MEMBER_FORCE, OFFSET, SUBJECT
 from mdstopo.general.peak_search import ALIKE, EVEN, MARGIN
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.general_model import SUBJECT, unpack_general
 from mdstopo.general.general_responses import (
@@ -55,11 +55,24 @@ def finished(model, tables, member_state, history, count, work):
     n_q = model.q0.shape[0]
     n = model.mass.shape[0]
     n_row = model.size[0]
+    # few arrays with many rows: each of its own would take as long as a short step
+    places = np.empty((4, n_q))
+    vectors = np.zeros((8, n))
+    multipliers = np.zeros((3, n_row))
     return Motion(
-        model, tables, member_state, history, count, work, make_workspace(model), np.empty(n_q), np.empty(n),
-        np.zeros(n), np.zeros(n_row), np.empty((3, n)), np.empty(n_row), np.empty(n_q), np.empty((3, n)),
-        np.empty(n_row), np.empty((2, n_q)), np.empty((2, 2, n)),
+        model, tables, member_state, history, count, work, make_workspace(model), places[0], vectors[0], vectors[1],
+        multipliers[0], vectors[2:5], multipliers[1], places[1], vectors[5:8], multipliers[2], places[2:4],
+        np.empty((2, 2, n)),
     )  # fmt: skip
+
+
+@part
+def goes_on(history, k):
+    """Whether no law, load or mode changes between step k, which is not the first one, and the step before."""
+    return (
+        history.index[k, SEGMENT] == history.index[k - 1, SEGMENT]
+        and history.index[k, EVENTS] == history.index[k - 1, EVENTS]
+    )
 
 
 @kernel
@@ -75,11 +88,7 @@ def known_at(tag, history, count, k, e):
     """
     if not is_explicit(tag) or k + e >= count:
         return -1
-    same = (
-        history.index[k + e, SEGMENT] == history.index[k, SEGMENT]
-        and history.index[k + e, EVENTS] == history.index[k, EVENTS]
-    )
-    return history.index[k + e, FIRST] if same else -1
+    return history.index[k + e, FIRST] if e == 0 or goes_on(history, k + e) else -1
 
 
 @kernel

@@ -13,6 +13,7 @@ from mdstopo.general.general_model import (
     GROUP,
     INERTER,
     KIND,
+    MEMBER_FORCE,
     MEMBER_FREE_LENGTH,
     OFFSET,
     PAIR,
@@ -20,7 +21,7 @@ from mdstopo.general.general_model import (
     START,
     SUBJECT,
 )
-from mdstopo.general.general_responses import MEMBER_FORCE, member_force
+from mdstopo.general.general_responses import member_force
 from mdstopo.general.members import MODE, SET, level_of, rate_of_row
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.step_history import has_factors, has_poses

@@ -27,8 +27,7 @@ from mdstopo.general.gauss_window import (
     solve_nodes,
     spread_balance,
 )
-from mdstopo.general.general_model import KIND, unpack_general
-from mdstopo.general.general_responses import ENERGY
+from mdstopo.general.general_model import ENERGY, KIND, unpack_general
 from mdstopo.general.generalized_alpha_step import rate_of
 from mdstopo.general.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
 from mdstopo.general.run_start import motion_at_start
@@ -181,7 +180,7 @@ def is_steady(model, segment):
 
 
 @kernel
-def predict(model, planes, h, o, history, nodes):
+def predict(model, planes, h, o, workspace, history, nodes):
     """First guess of a window: the motion under the forces at its start alone, with linear forces as they are there.
 
     Constant:
@@ -189,12 +188,13 @@ def predict(model, planes, h, o, history, nodes):
       planes (7, s_max, s_max): of `gauss_tables`, for the first number of nodes.
       h: length of the window (s).
       o: number of the window's first stage.
+      workspace: the workspace, for its switches.
     In and out:
       nodes: rows start and ahead, and the balance of node 0, are read.
       history: the history of steps, whose stages of the window are scratch.
     """
     s = COUNTS[FIRST_LEVEL]
-    spread_balance(model, history, o, s, nodes)
+    spread_balance(model, history, o, s, workspace, nodes)
     for i in range(s):
         for d in range(nodes.x.shape[1]):
             nodes.ref_x[i, d] = 0.0
@@ -262,16 +262,20 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     workspace = make_workspace(model)
     nodes = make_nodes(model)
     m = moving(model)
-    weight = np.zeros(nodes.x.shape[1])
+    rows = np.zeros((3, nodes.x.shape[1]))
+    weight = rows[0]
+    end = rows[1:3]
     weights = np.empty(model.mass.shape[0])
     lam = np.zeros(model.size[0])
-    end = np.zeros((2, nodes.x.shape[1]))
-    rel0 = np.empty((n_pair, pose_size(model)))
-    before = np.empty((n_pair, pose_size(model)))
-    after = np.empty((n_pair, pose_size(model)))
-    motion = np.zeros(n_pair)
-    noise = np.empty(n_pair)
-    scale = np.empty(n_pair)
+    poses = np.empty((3, n_pair, pose_size(model)))
+    rel0 = poses[0]
+    before = poses[1]
+    after = poses[2]
+    of_pairs = np.zeros((4, n_pair))
+    motion = of_pairs[0]
+    noise = of_pairs[1]
+    scale = of_pairs[2]
+    shortest = of_pairs[3]
     q0 = model.q0.copy()
     v0 = model.v0.copy()
     times = model.times
@@ -295,7 +299,6 @@ def windows(model, tables, member_state, settings, most, history, work, where):
         copy_vector(history.C[0].reshape(workspace.c.size), workspace.c.reshape(workspace.c.size))
     balanced = is_steady(model, np.int64(0))  # whether node 0 has the balance that the next prediction begins with
     motion_at_start(model, member_state, workspace, rel0, v0, scale, motion, noise)
-    shortest = np.empty(n_pair)
     shortest_at_start(model, rel0, shortest)
     last_time = times[times.shape[0] - 1]
     span = last_time - t
@@ -444,7 +447,7 @@ def _solve_window(
         nodes.when[0] = t + 0.5 * h
         one = np.int64(1)
         balance_nodes(model, member_state, segment, one, np.bool_(False), q0, rel0, workspace, history, o, nodes, work)
-    predict(model, planes, h, o, history, nodes)
+    predict(model, planes, h, o, workspace, history, nodes)
     turned = widest_turn(model, nodes.x[s - 1])
     if turned >= 3.0 and fixed_step <= 0.0:
         return NEWTON_FAILED, s, h / turned

@@ -15,6 +15,7 @@ from mdstopo.general.gauss_window import (
     add_changes,
     add_rate_products,
     fill_slopes,
+    has_rates,
     is_coupled,
     moving,
     pull_changes,
@@ -75,8 +76,9 @@ def state_at(model, history, w, c, x, y, q, v):
       x, y (n,): of the window. q (n_q,), v (n,): coordinates and velocities.
     """
     o, s, h = stages_of(history, w)
-    first = np.empty(s)
-    second = np.empty(s)
+    integral = np.empty((2, s))
+    first = integral[0]
+    second = integral[1]
     _polynomials(c, s, first, second)
     for d in range(moving(model)):
         x[d] = h * c * history.v[w, d]
@@ -103,8 +105,8 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
 
     Not needed here: tag, tables, member_state, count, keep, workspace, work.
     """
-    n = v.shape[0]
-    state_at(model, history, k, c, np.empty(n), np.empty(n), q, v)
+    inside = np.empty((2, v.shape[0]))
+    state_at(model, history, k, c, inside[0], inside[1], q, v)
     return k
 
 
@@ -121,8 +123,8 @@ def state_at_offset(tag, model, history, k, c, e, q, v, a, q_out, v_out):
 
     Not needed here: tag; q, v, a, which are those at c.
     """
-    n = v.shape[0]
-    state_at(model, history, k, c + e / (history.t[k + 1] - history.t[k]), np.empty(n), np.empty(n), q_out, v_out)
+    inside = np.empty((2, v.shape[0]))
+    state_at(model, history, k, c + e / (history.t[k + 1] - history.t[k]), inside[0], inside[1], q_out, v_out)
 
 
 @kernel
@@ -141,6 +143,12 @@ def is_continuous(tag):
 @kernel
 def is_explicit(tag):
     """Whether stages follow from those before them: windows of collocation are implicit."""
+    return False
+
+
+@kernel
+def ends_in_stage(tag):
+    """Whether the last stage of a step is its end: Gauss's nodes lie inside."""
     return False
 
 
@@ -262,8 +270,9 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
     root = np.zeros(width)
     for d in range(m):
         root[d] = np.sqrt(inverse[d])
-    back_x = np.empty((s, s))  # the integrations, transposed
-    back_y = np.empty((s, s))
+    back = np.empty((2, s, s))  # the integrations, transposed
+    back_x = back[0]
+    back_y = back[1]
     for i in range(s):
         for j in range(s):
             back_x[j, i] = planes[2][i, j]
@@ -313,14 +322,17 @@ def _row_back(
     value = room[4]
     none = room[5]
     spread = bars.shape[0] > 0
-    beta_x = np.zeros(s)
-    beta_y = np.zeros(s)
-    at = np.zeros(n)
+    beta = np.zeros((2, s))
+    beta_x = beta[0]
+    beta_y = beta[1]
     here = np.zeros((model.home.shape[0], window_size(model)))
-    change = np.zeros((5, n))
+    vectors = np.zeros((9, n))
+    change = vectors[0:5]
+    point = vectors[5:7]
+    at = vectors[7]
+    start = vectors[8]
     _weights_at(planes, s, c, beta_x, beta_y)
     _maps_at(model, history, w, c, beta_x, beta_y, at, here)
-    point = np.zeros((2, n))
     window_vjp(model, here, lam_q, lam_v, change[2], point[0], point[1])
     for j in range(s):
         for d in range(m):
@@ -334,17 +346,21 @@ def _row_back(
         combine_rows(back_x, s, s, h * h, rhs, room[7], value)
         combine_rows(back_y, s, s, h, value, room[8], rhs)
     take_rows(rhs, s, x)
+    rates = has_rates(model, workspace)
+    take_rows(none, s, bar_y)
     last = np.inf
     for _ in range(MOST_SWEEPS):
         work[SWEEPS] += 1
         _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change, bar_x, bar_y)
-        combine_rows(back_y, s, s, h, rhs, bar_y, value)
-        moved, size = renew_rows(back_x, s, h * h, value, bar_x, root, x)
+        if rates:
+            combine_rows(back_y, s, s, h, rhs, bar_y, value)
+            moved, size = renew_rows(back_x, s, h * h, value, bar_x, root, x)
+        else:
+            moved, size = renew_rows(back_x, s, h * h, rhs, bar_x, root, x)
         if moved <= 4e-16 * size or (moved >= last and moved <= 1e-13 * size):
             break
         last = moved
     _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change, bar_x, bar_y)
-    start = np.zeros(n)
     window_start_vjp(model, at, lam_q, start)
     for d in range(m):
         lam_v[d] = point[1, d] + h * c * point[0, d]
@@ -385,10 +401,12 @@ def _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change
       inverse (n,): inverse masses; 0 of ground. maps (s, n_body, MAPS), dense (2, s, M, W): of the nodes, by rows.
       none (s, W): zeros. x (s, W): cotangents of u.
     Out:
-      bar_x, bar_y: overwritten. change (5, n): scratch.
+      bar_x, bar_y: overwritten; bar_y stays as it is where G does not depend on y. change (5, n): scratch.
     """
     if dense.shape[2] > 0:
         add_products(dense[0], x, s, none, bar_x)
+        if not has_rates(model, workspace):
+            return
         take_rows(none, s, bar_y)
         add_rate_products(model, dense[1], x, s, is_coupled(model, workspace), bar_y)
         return
@@ -484,7 +502,8 @@ def _row_forward(model, planes, history, w, c, workspace, inverse, maps, dense, 
         integrate_to_nodes(planes[1], s, s, h, ends[0], none[0], planes[0, 0], du, by_y)
         if dense.shape[2] > 0:
             add_products(dense[0], by_x, s, given, value)
-            add_rate_products(model, dense[1], by_y, s, is_coupled(model, workspace), value)
+            if has_rates(model, workspace):
+                add_rate_products(model, dense[1], by_y, s, is_coupled(model, workspace), value)
         else:
             take_rows(given, s, value)
             for i in range(s):
@@ -545,5 +564,6 @@ implement(
     derivatives=derivatives,
     is_continuous=is_continuous,
     is_explicit=is_explicit,
+    ends_in_stage=ends_in_stage,
     weights_of=weights_of,
 )

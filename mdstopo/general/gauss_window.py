@@ -41,6 +41,7 @@ from mdstopo.integrators.rows import (
 )
 from mdstopo.integrators.steps import FORCES, SWEEPS, TANGENTS
 from mdstopo.mechanics.kinematics.kinematics_interface import (
+    coordinates,
     deflection,
     freedoms,
     load_slopes,
@@ -130,6 +131,12 @@ def is_coupled(model, workspace):
     return workspace.switches[DAMPED] != 0
 
 
+@part
+def has_rates(model, workspace):
+    """Whether G depends on y: where anything is damped, and in space, where turning bodies have gyroscopic moments."""
+    return is_coupled(model, workspace) or coordinates(model) != freedoms(model)
+
+
 @kernel
 def balance_nodes(model, member_state, segment, s, energies, q0, rel0, workspace, history, o, nodes, work):
     """Compute accelerations G and their slopes at the first nodes, from their x and y, in one pass over the springs.
@@ -214,15 +221,17 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
       by_rows: whether by rows.
     Out:
       by_q, by_v (M, W): scratch.
-      by_x, by_y (M, W): the slopes.
+      by_x, by_y (M, W): the slopes; by_y stays zero where there are none (`has_rates`).
     """
     coupled = is_coupled(model, workspace)
+    rates = has_rates(model, workspace)
     m = by_q.shape[0]
     each = freedoms(model)
     for d in range(m):
         for e in range(0, by_q.shape[1], lanes()):
             store(by_q[d], e, zero())
-            store(by_v[d], e, zero())
+            if rates:
+                store(by_v[d], e, zero())
     for p in range(model.pair.shape[0]):
         for i in range(4):
             row = each * model.pair[p, i // 2]
@@ -234,7 +243,7 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
                     _subtract_block(inverse, history.C[o, p], first, each * (i % 2), row, column, each, by_v)
     turn = history.turn[o]
     turns = rotations(model)
-    for first in range(0, m, each):
+    for first in range(0, m if workspace.switches[TURNING] != 0 else 0, each):
         column = first + each - turns
         for d in range(first, first + each):
             for r in range(turns):
@@ -244,11 +253,14 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
     window_slopes(model, maps, coupled, by_q, by_v)
     if by_rows:
         take_rows(by_q, np.int64(m), by_x)
-        take_rows(by_v, np.int64(m), by_y)
+        if rates:
+            take_rows(by_v, np.int64(m), by_y)
         return
     for d in range(m):
         for e in range(m):
             by_x[e, d] = by_q[d, e]
+        if not rates:
+            continue
         first = 0 if coupled else d - d % each
         last = m if coupled else first + each
         for e in range(first, last):  # zero elsewhere, and always was
@@ -333,17 +345,19 @@ def pull_changes(model, workspace, history, o, maps, inverse, x, change, bar_x, 
 
 
 @kernel
-def spread_balance(model, history, o, s, nodes):
+def spread_balance(model, history, o, s, workspace, nodes):
     """Copy accelerations and slopes of node 0 to nodes 1 to s - 1: as a prediction has them.
 
     model: the compiled scene. history, o: the history of steps, and its stage of node 0. s: number of nodes.
-    nodes: the room of the window.
+    workspace: the workspace, for its switches. nodes: the room of the window.
     """
+    rates = has_rates(model, workspace)
     for i in range(1, s):
         copy_vector(nodes.g[0], nodes.g[i])
         if is_dense(nodes):
             take_rows(nodes.by_x[0], np.int64(nodes.by_x.shape[1]), nodes.by_x[i])
-            take_rows(nodes.by_y[0], np.int64(nodes.by_y.shape[1]), nodes.by_y[i])
+            if rates:
+                take_rows(nodes.by_y[0], np.int64(nodes.by_y.shape[1]), nodes.by_y[i])
             continue
         copy_vector(nodes.maps[0].reshape(nodes.maps[0].size), nodes.maps[i].reshape(nodes.maps[i].size))
         copy_vector(history.K[o].reshape(history.K[o].size), history.K[o + i].reshape(history.K[o].size))
@@ -394,11 +408,13 @@ def solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, share
     last = np.inf
     growing = 0
     c = planes[0, 0]
+    rates = has_rates(model, workspace)
     for sweep in range(81):
         change = move_to_nodes(
             planes[2], s, h * h, nodes.none, nodes.ahead, c, nodes.u, weight, nodes.ref_x, nodes.x, nodes.dx
         )
-        integrate_to_nodes(planes[1], s, s, h, nodes.start, nodes.none, c, nodes.u, nodes.y)
+        if rates:
+            integrate_to_nodes(planes[1], s, s, h, nodes.start, nodes.none, c, nodes.u, nodes.y)
         if sweep > 0:
             work[SWEEPS] += 1
             if sweep == 1:
@@ -413,10 +429,12 @@ def solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, share
             if growing >= 3 or sweep == 80:
                 return -1.0
             last = change
-        subtract_rows(nodes.y, nodes.ref_y, s, nodes.dy)
+        if rates:
+            subtract_rows(nodes.y, nodes.ref_y, s, nodes.dy)
         if is_dense(nodes):
             add_products(nodes.by_x, nodes.dx, s, nodes.g, nodes.u)
-            add_rate_products(model, nodes.by_y, nodes.dy, s, is_coupled(model, workspace), nodes.u)
+            if rates:
+                add_rate_products(model, nodes.by_y, nodes.dy, s, is_coupled(model, workspace), nodes.u)
             continue
         for i in range(s):
             copy_vector(nodes.g[i], nodes.u[i])
@@ -424,6 +442,8 @@ def solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, share
                 model, workspace, history, o + i, nodes.maps[i], nodes.inverse, nodes.dx[i], nodes.dy[i], nodes.change,
                 nodes.row, nodes.u[i],
             )  # fmt: skip
+    if not rates:
+        integrate_to_nodes(planes[1], s, s, h, nodes.start, nodes.none, c, nodes.u, nodes.y)
     return largest_difference(nodes.x, nodes.ref_x, weight, s)
 
 

@@ -125,6 +125,8 @@ class GeneralDriver:
         #: of the laws' variables; none before the first design
         self._values = np.zeros(0)
         self.member_state = np.zeros((3, padded + len(model.contact_pair) + 1))
+        #: responses that are expressions, which may have no values
+        self._expressions = [j for j, response in enumerate(scene.responses) if response.of]
         self.padded = np.zeros(padded + varied)
         self._swept = self.padded.reshape(1, -1)
         self.found = np.zeros(count, dtype=np.int64)
@@ -307,17 +309,17 @@ class GeneralDriver:
                     self._reduce_response(j, reduction, count, gradient, window)
             if gradient and not differentiated:
                 self.row_gradients(count, across)
-            status, message = self._without_value(gradient)
-        grazing, meeting = self._grazing(), int(self.where[1])
+            if self._expressions:
+                status, message = self._without_value(gradient)
+        grazing, meeting = self._grazing(), self.where.item(1)
         return ResponseResult(
             status, time, self.rows, self.found, self.gradients, meeting, grazing, across, message=message
         )
 
     def _without_value(self, gradient: bool) -> tuple[Status, str]:
         """Whether expressions that are responses have values, and gradients where wanted; which has none, and when."""
-        for j, response in enumerate(self.scene.responses):
-            if not response.of:
-                continue
+        for j in self._expressions:
+            response = self.scene.responses[j]
             found = self.rows[j, : self.found[j]]
             none = found[~np.isfinite(found[:, VALUE])]
             if len(none):
@@ -365,10 +367,9 @@ class GeneralDriver:
 
     def _grazing(self) -> int:
         """A member (padded) that grazes (`events`), so that the motion or a row found has no derivative; or -1."""
-        if self.where[2] >= 0:
-            return int(self.where[2])
-        if self.events == 0:
-            return -1
+        grazing = self.where.item(2)
+        if grazing >= 0 or self.events == 0:
+            return grazing
         steps, events = int(self.limits[1]), int(self.limits[3])
         event = self.room_ints[4 * (steps + 1) :].reshape(events, 6)[: self.events]
         for state, member, *_ in event[event[:, GRAZES] != 0].tolist():
@@ -425,14 +426,17 @@ class GeneralDriver:
     def _find_peaks_with_gradients(self, count: int, window: float) -> bool:
         """Rows of the only response, with their gradients; False where these are still to be found."""
         (reduction,) = self.scene.reductions
-        found, differentiated = self.ready("peaks_vjp", self.entry.peaks_vjp, *self._plain_arguments(count, window))
+        found, differentiated = self.ready.often(
+            "peaks_vjp", self.entry.peaks_vjp, (self.floats, self.rows), ((6, count), (10, window)),
+            lambda: self._plain_arguments(count, window),
+        )  # fmt: skip
         self.found[0] = found
         if reduction.is_magnitude:
             self.rows[0, :found, VALUE] *= self.rows[0, :found, SIGN]
         return bool(differentiated)
 
     def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:
-        """All arguments of `peaks_vjp`."""
+        """All arguments of `peaks_vjp`; `_find_peaks_with_gradients` says where count and window stand."""
         both = self.scene.reductions[0].is_magnitude
         return (
             *self.steps_arguments(count), 0, both, self.steps_are_fine, window, self.room, self.room_ints,
@@ -622,7 +626,7 @@ class GeneralDriver:
         )  # fmt: skip
 
     def _simulate_arguments(self, tangent: bool) -> tuple[Any, ...]:
-        """The arguments of the entry that makes steps."""
+        """The arguments of the entry that makes steps; `run` says where `tangent` stands."""
         return (
             self.ints, self.floats, self.method.tables, self._alpha, tangent, self.settings, self.limits, self.room,
             self.room_ints, self.member_state, self.work, self.where,
@@ -643,9 +647,11 @@ class GeneralDriver:
             self.pack(landed(self.with_start(), quadrature_breakpoints)) if quadrature_breakpoints else self._packed
         )
         while True:
-            self.work[:] = 0
-            arguments = self._simulate_arguments(tangent)
-            code, count, self.events, time = self.ready("simulate", self.entry.simulate, *arguments)
+            self.work.fill(0)
+            code, count, self.events, time = self.ready.often(
+                "simulate", self.entry.simulate, (self.floats,), ((4, tangent),),
+                lambda: self._simulate_arguments(tangent),
+            )  # fmt: skip
             if code != NEEDS_ROOM:
                 code, count, time = self._up_to_half_a_turn(code, count, time)
                 self.count = count
@@ -738,9 +744,11 @@ class GeneralDriver:
 
     def take(self, design: FloatArray) -> None:
         """Take a design: alpha (N,), and behind it the values of variables (P,), or none for the initial ones."""
-        n = len(self._alpha)
-        self._alpha[:] = design[:n]
-        if self._placing is not None:
+        if self._placing is None:
+            self._alpha[:] = design
+        else:
+            n = len(self._alpha)
+            self._alpha[:] = design[:n]
             values = design[n:] if len(design) > n else self._placing.initial
             if not np.array_equal(values, self._values):
                 self._values = values.copy()

@@ -49,6 +49,8 @@ ALONG_FREE_LENGTH = -1
 MEMBER_FREE_LENGTH, MEMBER_EXCESS = -2, -1
 #: the law code of an inerter, which is no function of elongation and rate
 INERTER = -1
+#: codes (column KIND) of the two responses that depend on the design at fixed motion: stored energy, forces of members
+ENERGY, MEMBER_FORCE = 0, 3
 
 
 class GeneralModel(NamedTuple):
@@ -72,7 +74,10 @@ class GeneralModel(NamedTuple):
             "member in it; of a grid: members of a row",
         ),
     ]
-    law: Annotated[FloatArray, Field("n_block, 8", "the law's parameters (`mechanics.laws.law_table`)")]
+    law: Annotated[
+        FloatArray,
+        Field("n_block, 8", "the law's parameters (`mechanics.laws.law_table`); of springs `laws.spring.FAR`, too"),
+    ]
     active: Annotated[IndexArray, Field("n_seg, n_block", "1 where the law acts during a segment")]
     level: Annotated[FloatArray, Field("n_seg, n_block, 2", "a tabulated force at the segment's start (N), its slope")]
     power: Power
@@ -128,7 +133,11 @@ class GeneralModel(NamedTuple):
     ]
     row: Annotated[IndexArray, Field("n_joint, rows", "the place of each of its rows among the solved ones, or -1")]
     unknown_index: Annotated[
-        IndexArray, Field("n_place", "where each coordinate, then each solved row, stands in the banded matrix")
+        IndexArray,
+        Field(
+            "n_place",
+            "where each free coordinate and each solved row stands in the banded matrix; behind it driven ones",
+        ),
     ]
     size: Annotated[
         IndexArray,

@@ -43,9 +43,11 @@ from mdstopo.general.general_model import (
     CODE,
     COMPONENT,
     COUNT,
+    ENERGY,
     GROUP,
     INERTER,
     KIND,
+    MEMBER_FORCE,
     MEMBER_FREE_LENGTH,
     OFFSET,
     ORDER,
@@ -95,8 +97,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 #: the kernels of responses by their code, column KIND of `GeneralModel.response`; `code_of` fills it
 LISTED: Listed[ResponseKernels] = Listed()
-#: codes of the two responses that depend on the design at fixed motion: stored energy, forces of members
-ENERGY, MEMBER_FORCE = 0, 3
 #: forces of several members that differ by less than this, relative, are the same force: they share what the largest of
 #: them does to derivatives
 TIE = 1e-9

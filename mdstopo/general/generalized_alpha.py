@@ -19,7 +19,7 @@ from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.event_log import CHATTER, log_at_breakpoint, log_switches
 from mdstopo.general.events import first_sign, has_switches, room_for_watched, smallest_margin, watch_all
 from mdstopo.general.general_model import unpack_general
-from mdstopo.general.generalized_alpha_step import AUXILIARY, VELOCITY, advance, rate_of
+from mdstopo.general.generalized_alpha_step import AUXILIARY, VELOCITY, advance, make_step_room, rate_of
 from mdstopo.general.locate import (
     CUTS,
     TRIALS,
@@ -158,6 +158,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     shortest = np.empty(n_pair)
     shortest_at_start(model, rel0, shortest)
     span = times[times.shape[0] - 1] - t
+    own = make_step_room(model)
     step = settings[2]
     if not step > 0.0:
         rate = rate_of(model, workspace)
@@ -199,7 +200,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             starting = np.bool_(known == 0)
             code, used, singular = advance(
                 model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance, size,
-                stages, workspace, history, end_q, ends, push, extent, rel0, work,
+                stages, workspace, history, end_q, ends, push, extent, rel0, own, work,
             )  # fmt: skip
             if code != OK:
                 where[0] = singular
@@ -240,7 +241,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     copy_rows(state, kept)
                     code, _, singular = advance(
                         model, tables[0], member_state, segment, t, middle, starting, q, kept, guess, newton_tolerance,
-                        size, nowhere, workspace, history, beyond_q[top], beyond[top], push, extent, rel0, work,
+                        size, nowhere, workspace, history, beyond_q[top], beyond[top], push, extent, rel0, own, work,
                     )  # fmt: skip
                     if code != OK:
                         where[0] = singular
@@ -280,7 +281,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         code, _, singular = advance(
                             model, tables[0], member_state, segment, t, middle, starting, q, kept, guess,
                             newton_tolerance, size, nowhere, workspace, history, trial_q, trial, push, extent,
-                            rel0, work,
+                            rel0, own, work,
                         )  # fmt: skip
                         if code != OK:
                             where[0] = singular
@@ -295,7 +296,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     lands = lands and t + h >= end
                     code, used, singular = advance(
                         model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance,
-                        size, stages, workspace, history, end_q, ends, push, extent, rel0, work,
+                        size, stages, workspace, history, end_q, ends, push, extent, rel0, own, work,
                     )  # fmt: skip
                 relative_pose(model, end_q, ends[VELOCITY], rel)
             finite = True

@@ -71,6 +71,12 @@ def is_explicit(tag):
 
 
 @kernel
+def ends_in_stage(tag):
+    """Whether the last stage of a step is its end: the balance is imposed there."""
+    return True
+
+
+@kernel
 def weights_of(tag, model, tables, history, w, out):
     """Weights of the stages in an integral, by the trapezoidal rule; see `method_interface.weights_of`.
 
@@ -342,5 +348,6 @@ implement(
     derivatives=derivatives,
     is_continuous=is_continuous,
     is_explicit=is_explicit,
+    ends_in_stage=ends_in_stage,
     weights_of=weights_of,
 )

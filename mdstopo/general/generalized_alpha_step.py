@@ -1,11 +1,14 @@
 """One step of generalized-alpha of a general scene (formulas in `generalized_alpha`)."""
 
+from typing import Any
+
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import OF_STEP, newton_correction, solve_accelerations, subtract_matrices
 from mdstopo.general.projection import project
-from mdstopo.general.step_history import copy_vector, keep_stage
+from mdstopo.general.step_history import copy_vector, keep_energy, keep_stage
+from mdstopo.general.structures import bundle
 from mdstopo.integrators.springs_gauss_equations import CLOSELY
 from mdstopo.integrators.springs_generalized_alpha import MOST, RESOLVED, RESTART, weights_of
 from mdstopo.integrators.steps import FORCES, NEWTON, NEWTON_FAILED, NON_FINITE, OK, SINGULAR, TANGENTS
@@ -23,6 +26,26 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 
 #: rows of what a step hands to the next beside coordinates: velocities, accelerations, the method's auxiliary ones
 VELOCITY, ACCELERATION, AUXILIARY = range(3)
+
+
+class StepRoom:
+    """Scratch of `advance`, made once by `make_step_room`: q (n_q,), vectors (8, n), lam and row (n_row,), scale
+    (n_pair,)."""
+
+    def __init__(self, *_arrays: Any) -> None: ...
+
+
+bundle(StepRoom, ("q", "vectors", "lam", "row", "scale"))
+
+
+@kernel
+def make_step_room(model):
+    """A `StepRoom`."""
+    n_row = model.size[0]
+    return StepRoom(
+        np.empty(model.q0.shape[0]), np.empty((8, model.mass.shape[0])), np.empty(n_row), np.empty(n_row),
+        np.empty(model.pair.shape[0]),
+    )  # fmt: skip
 
 
 @kernel
@@ -81,6 +104,7 @@ def advance(
     push,
     extent,
     rel0,
+    room,
     work,
 ):
     """One step of the method, by Newton's iteration.
@@ -105,6 +129,7 @@ def advance(
       end_q (n_q,), ends (3, n): coordinates, and v, a, x at the end; q, v on the joints.
       push (2, n_row): the multipliers that put them there (`projection`).
       workspace: workspace of a balance, overwritten.
+      room: scratch (`StepRoom`).
       work (WORK,): counts of work, added to.
 
     Returns a code (`integrators.steps`), the number of stages, and the place of a singular unknown, or -1.
@@ -113,8 +138,8 @@ def advance(
     n_row = model.size[0]
     e1, e2, e3, beta, gamma, lag = weights_of(radius)
     yes = np.bool_(True)
-    q = np.empty(q0.shape[0])
-    rows = np.empty((8, n))
+    q = room.q
+    rows = room.vectors
     v = rows[0]
     way = rows[1]
     shift = rows[2]
@@ -126,9 +151,10 @@ def advance(
     v0 = state[VELOCITY]
     a = state[ACCELERATION]
     x = state[AUXILIARY]
-    lam = np.zeros(n_row)
-    row = np.empty(n_row)
-    scale = np.empty(model.pair.shape[0])
+    lam = room.lam
+    row = room.row
+    scale = room.scale
+    lam[:] = 0.0
     stages = 0
     if starting:
         copy_vector(q0, q)
@@ -212,6 +238,7 @@ def advance(
         for r in range(n_row):
             lam[r] += row[r]
         keep_stage(model, history, o + stages, t + h, q, v, now, lam, workspace, yes)
+        keep_energy(model, history, o + stages, v, workspace)
     copy_vector(q, end_q)
     copy_vector(v, ends[VELOCITY])
     copy_vector(now, ends[ACCELERATION])

@@ -136,7 +136,10 @@ def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray, bodies: 
 
 
 def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]], each: int) -> tuple[IndexArray, int]:
-    """Place of each coordinate and row in the banded matrix, and how far from the diagonal its farthest entry is."""
+    """Place of each coordinate and row in the banded matrix, and how far from the diagonal its farthest entry is.
+
+    Driven coordinates are no unknowns: their places are behind those of the matrix.
+    """
     total = n + len(columns)
     links: set[tuple[int, int]] = set()
     for a, b in pair.tolist():
@@ -148,6 +151,8 @@ def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]],
     for r, coordinates in enumerate(columns):
         links.update((n + r, d) for d in coordinates)
     place = _reordered(links, total) if total > FEW else np.arange(total, dtype=np.int64)
+    driven = np.concatenate([free == 0, np.zeros(len(columns), dtype=bool)])
+    place[np.lexsort((place, driven))] = np.arange(total)
     return place, _width(links, place)
 
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from mdstopo.general.competing_members import compare, members_of
 from mdstopo.general.extremes import FRACTIONS
-from mdstopo.general.general_model import KIND
-from mdstopo.general.general_responses import MEMBER_FORCE, TIE
+from mdstopo.general.general_model import KIND, MEMBER_FORCE
+from mdstopo.general.general_responses import TIE
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 if TYPE_CHECKING:

@@ -1,13 +1,13 @@
 """What a method of integration does for responses and sweeps, chosen by its tag when a kernel is compiled.
 
-The tag is a tuple of zeros whose length says which method is meant. A method has nine functions:
+The tag is a tuple of zeros whose length says which method is meant. A method has these functions:
 
 1. `point_of`: the state inside a step;
 2. `step_back`: a step of the reverse sweep;
 3. `step_forward`: changes pushed through a step; `carried`: how many vectors beside the state go with them;
 4. `state_at_offset`: the motion a little later; `derivatives`: how many of its derivatives are those of the balance;
    `is_continuous`: whether states inside a step are at hand; `is_explicit`: whether stages follow from those before
-   them, and the first is the start of the step;
+   them, and the first is the start of the step; `ends_in_stage`: whether the last one is its end;
 5. `weights_of`: weights of a step's stages in an integral.
 
 A Runge-Kutta method that takes the steps of `adaptive_steps` has three more:
@@ -35,6 +35,7 @@ IMPLEMENTED: dict[str, dict[int, Any]] = {
     "step_error": {},
     "scheme": {},
     "is_explicit": {},
+    "ends_in_stage": {},
 }
 #: what `make_stages` returns of an implicit stage that is not found: no place of an unknown
 UNSOLVED = 2**40
@@ -210,6 +211,11 @@ def is_explicit(tag):
     raise NotImplementedError
 
 
+def ends_in_stage(tag):
+    """Whether the last stage of a step is its end, but for what joints move this by."""
+    raise NotImplementedError
+
+
 def implement(tag: tuple[int, ...], **functions: Callable[..., Any]) -> None:
     """Register the compiled functions of a method of integration under its tag."""
     for name, function in functions.items():
@@ -222,6 +228,6 @@ def _of(name: str, tag: Any) -> Any:
 
 for _stub in (
     point_of, step_back, step_forward, carried, state_at_offset, derivatives, is_continuous, weights_of, make_stages,
-    step_error, scheme, is_explicit,
+    step_error, scheme, is_explicit, ends_in_stage,
 ):  # fmt: skip
     by_type(_stub, "tag", partial(_of, _stub.__name__))

@@ -6,7 +6,6 @@ It is `peak_search.peaks_of_steps` and then `row_sweep.rows_vjp` of the rows tha
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.dense_output import finished
 from mdstopo.general.extremes import COLUMNS, FRACTION, NOBODY, OTHER, SIGN, STEP
 from mdstopo.general.general_model import unpack_general
@@ -60,8 +59,7 @@ def peaks_vjp(
         rows[m] = out[order[m]]
     own = padded if found == 1 else np.empty((found, padded.shape[1]))
     starts = np.empty((found, 0))
-    workspace = make_workspace(model)
-    rows_gradients(tag, model, tables, member_state, history, count, which, rows, workspace, starts, own, work)
+    rows_gradients(tag, model, tables, member_state, history, count, which, rows, motion.workspace, starts, own, work)
     for m in range(found):
         gradient = gradients[order[m]]
         unscale_general(model.block, model.power, alpha, own[m], gradient)

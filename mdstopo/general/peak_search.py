@@ -12,7 +12,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.adjoint import at_stage
-from mdstopo.general.dense_output import balance_at_end, evaluate_here, finished, go_to, time_at
+from mdstopo.general.dense_output import balance_at_end, evaluate_here, finished, go_to, goes_on, known_at, time_at
 from mdstopo.general.extremes import (
     COLUMNS,
     FRACTION,
@@ -28,9 +28,9 @@ from mdstopo.general.extremes import (
     VALUE,
     WHO,
 )
-from mdstopo.general.general_model import ORDER, unpack_general
+from mdstopo.general.general_model import ENERGY, KIND, ORDER, unpack_general
 from mdstopo.general.general_responses import follows_state, kinked, needs_balance
-from mdstopo.general.method_interface import is_continuous
+from mdstopo.general.method_interface import ends_in_stage, is_continuous
 from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.integrators.steps import OF_POINTS, OF_SAMPLES
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic
@@ -73,6 +73,24 @@ def evaluate_exactly(tag, motion, j, k, c, who):
 
 
 @kernel
+def kept_energy(tag, motion, k, e):
+    """The number of the stage whose stored energy is that at the start (e = 0) or the end (e = 1) of step k; -1 where
+    none is.
+
+    The last stage of a step is at its end but for joints and for Newton's last correction. So it is taken only where
+    the next step goes on with its sample: both sides are the same, and there is no peak between them.
+
+    tag: the method of integration (`method_interface`). motion: the finished motion.
+    """
+    history, count = motion.history, motion.count
+    if not ends_in_stage(tag):
+        return known_at(tag, history, count, k, e)
+    if e == 0 or k + 1 >= count or motion.model.size[0] > 0 or not goes_on(history, k + 1):
+        return -1
+    return history.index[k + 1, FIRST] - 1
+
+
+@kernel
 def sample_ends(tag, motion, j, plain, seen, accelerations):
     """Evaluate a response at both ends of every step that is not LOW, on the step's own side.
 
@@ -85,22 +103,23 @@ def sample_ends(tag, motion, j, plain, seen, accelerations):
     """
     history = motion.history
     shared = follows_state(tag, motion.model, j)
+    stored = shared and motion.model.response[j, KIND] == ENERGY
     for k in range(motion.count):
         if plain[k] == LOW:
             seen[k] = np.nan
             continue
         restore_modes(history, history.index[k, EVENTS], motion.member_state)
         for e in range(2):
-            if (
-                e == 0
-                and shared
-                and k > 0
-                and plain[k - 1] != LOW
-                and history.index[k, SEGMENT] == history.index[k - 1, SEGMENT]
-                and history.index[k, EVENTS] == history.index[k - 1, EVENTS]
-            ):
+            if e == 0 and shared and k > 0 and plain[k - 1] != LOW and goes_on(history, k):
                 copy_vector(seen[k - 1, LAST], seen[k, 0])
                 copy_vector(accelerations[k - 1, 1], accelerations[k, 0])
+                continue
+            stage = kept_energy(tag, motion, k, e) if stored else -1
+            if stage >= 0:
+                seen[k, e * LAST, G] = history.energy[stage, 0]
+                seen[k, e * LAST, DG] = history.energy[stage, 1]
+                seen[k, e * LAST, MEMBER] = -1
+                accelerations[k, e] = np.nan
                 continue
             copy_vector(history.q[k + e], motion.q)
             copy_vector(history.v[k + e], motion.v)

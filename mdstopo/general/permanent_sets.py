@@ -27,6 +27,7 @@ from mdstopo.general.general_model import (
     DESIGN,
     GROUP,
     KIND,
+    MEMBER_FORCE,
     MEMBER_FREE_LENGTH,
     OFFSET,
     PAIR,
@@ -40,7 +41,7 @@ from mdstopo.general.general_model import (
     VARIED_STOP,
     VARIED_VALUE,
 )
-from mdstopo.general.general_responses import MEMBER_FORCE, energy_weight, member_force
+from mdstopo.general.general_responses import energy_weight, member_force
 from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.parameters import moved_side, varies_member
 from mdstopo.general.step_history import (

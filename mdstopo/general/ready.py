@@ -26,6 +26,7 @@ class Ready:
 
     def __init__(self) -> None:
         self._kept: dict[str, _Kept] = {}
+        self._often: dict[str, tuple[tuple[Any, ...], tuple[tuple[int, Any], ...], Callable[..., Any]]] = {}
 
     def __call__(self, name: str, entry: Any, *arguments: Any) -> Any:
         """entry(*arguments), two arrays or more among them; their types are always the same under one name."""
@@ -37,3 +38,28 @@ class Ready:
             return kept.call()
         kept.numbers = numbers
         return kept.call(*[(k, arguments[k]) for k in kept.places])
+
+    def often(
+        self,
+        name: str,
+        entry: Any,
+        changing: tuple[Any, ...],
+        numbers: tuple[tuple[int, Any], ...],
+        arguments: Callable[[], tuple[Any, ...]],
+    ) -> Any:
+        """entry(*arguments()) of a call that is made at every evaluation, where few arguments ever change: these alone
+        are looked at, and the others asked for when it is prepared.
+
+        changing: those of the arguments, or what they come from, that may be other objects than last time.
+        numbers: places among the arguments of the numbers that may be others, and what they are.
+        """
+        found = self._often.get(name)
+        if found is None or not all(map(is_, found[0], changing)):
+            call = entry.prepare(*arguments())
+            self._often[name] = changing, numbers, call
+            return call()
+        _, last, call = found
+        if last == numbers:
+            return call()
+        self._often[name] = changing, numbers, call
+        return call(*numbers)

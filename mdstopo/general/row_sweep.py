@@ -4,6 +4,9 @@ All rows go through the steps together, so what a step needs (tangents, factors,
 read or formed once for all of them; each row joins at its own step. A point inside a step that needs a step of its own
 (`method_interface`) is gone through by its row alone before it joins.
 
+Of few rows, short steps are gone through first, and the members at all of their stages gathered in one pass: a pass for
+each step of one stage would cost little more than being called.
+
 A step is linear in the cotangents. Where there are more rows than free coordinates and velocities, these go through it
 one by one, as unit cotangents, and each row is the sum of what became of them: however many rows there are, a step
 costs what so few do.
@@ -23,9 +26,12 @@ from mdstopo.general.method_interface import is_explicit, step_back
 from mdstopo.general.parameters import add_times
 from mdstopo.general.permanent_sets import add_sets_of_rows, count_sets, keep_start
 from mdstopo.general.row_design import add_designs_of_rows
-from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, restore_modes
+from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.step_linear import free_places
 from mdstopo.scene.springs_model import FloatArray, IndexArray
+
+#: stages of a step that is short, how many stages of such steps are gathered at once, and of how many rows at most
+SHORT, GATHERED, FEW = 3, 64, 16
 
 
 class Units(NamedTuple):
@@ -54,9 +60,10 @@ def make_units(model, rows, columns):
     n = model.mass.shape[0]
     place = free_places(model)
     many = 2 * place.shape[0] if rows > 2 * place.shape[0] else 0
+    both = np.empty((2, many, n))
     return Units(
-        place, np.empty((many, n)), np.empty((many, n)), np.zeros((many, 2, n)),
-        np.empty((many, count_sets(model))), np.empty((many, 17, n)), np.empty((many, columns)), np.ones(many),
+        place, both[0], both[1], np.zeros((many, 2, n)), np.empty((many, count_sets(model))),
+        np.empty((many, 17, n)), np.empty((many, columns)), np.ones(many),
     )  # fmt: skip
 
 
@@ -97,6 +104,52 @@ def step_of_rows(
     for m in range(c.shape[0]):
         c[m] = 1.0
     return history.index[w, PARENT]
+
+
+@part
+def is_short(history, w):
+    """Whether step w has few stages."""
+    return history.index[w + 1, FIRST] - history.index[w, FIRST] <= SHORT
+
+
+@kernel
+def short_steps_of_rows(
+    tag, model, tables, member_state, history, w, stop, c, lam_q, lam_v, lam_x, z, gathered, y, workspace, out, work
+):
+    """Pull the cotangents of R rows through short steps of one segment, back from step w, without events between them.
+
+    tag, model, tables, history, c, lam_q, lam_v, lam_x, z, y, workspace, out, work: as of `step_of_rows`.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member, as in these steps.
+    w, stop: the first step, and the one in front of which the last one begins, at the latest.
+    gathered (R, GATHERED, n): scratch.
+
+    Returns the number of the step before, or -1.
+    """
+    none = np.empty((0, 3, lam_q.shape[1]))
+    no_rows = np.empty((0, model.size[0]))
+    segment = history.index[w, SEGMENT]
+    first = gathered.shape[1]
+    o = history.index[w + 1, FIRST]
+    while w >= stop and first >= SHORT and is_short(history, w) and history.index[w, SEGMENT] == segment:
+        step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, none, no_rows, z, y, workspace, work)
+        stages = o - history.index[w, FIRST]
+        first -= stages
+        o -= stages
+        for m in range(z.shape[0]):
+            for j in range(stages):
+                copy_vector(z[m, j], gathered[m, first + j])
+            c[m] = 1.0
+        w = history.index[w, PARENT]
+    stages = gathered.shape[1] - first
+    if first > 0:
+        for m in range(gathered.shape[0]):
+            for j in range(stages):
+                copy_vector(gathered[m, first + j], gathered[m, j])
+    if gathered.shape[0] == 1:
+        add_designs(model, segment, history, o, member_state, gathered[0, :stages], out[0], work)
+    else:
+        add_designs_of_rows(model, segment, history, o, stages, member_state, gathered, out, work)
+    return w
 
 
 @kernel
@@ -218,8 +271,9 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
     total = rows.shape[0]
     bars = np.empty((3, n))
     bar_set = np.zeros((total, count_sets(model)))
-    lam_q = np.zeros((total, n))
-    lam_v = np.zeros((total, n))
+    both = np.zeros((2, total, n))
+    lam_q = both[0]
+    lam_v = both[1]
     lam_x = np.zeros((total, 2, n))
     begins = np.empty(total, np.int64)
     fraction = np.ones(total)
@@ -240,6 +294,9 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
             )  # fmt: skip
         begins[m] = w
     units = make_units(model, total, out.shape[1])
+    gathers = total <= FEW and history.index[count, EVENTS] == 0
+    gathers = gathers and model.varied.shape[0] == 0 and bar_set.shape[1] == 0
+    gathered = np.empty((total if gathers else 0, GATHERED, n))
     w = begins[0] if total > 0 else -1
     active = 0
     while w >= 0:
@@ -254,6 +311,13 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
                 model, history, member_state, count, w, lam_q[:active], lam_v[:active], bar_set[:active], out[:active]
             )
             w = history.index[w, PARENT]
+            continue
+        if gathers and is_short(history, w):
+            stop = begins[active] + 1 if active < total else np.int64(0)
+            w = short_steps_of_rows(
+                tag, model, tables, member_state, history, w, stop, fraction[:active], lam_q[:active], lam_v[:active],
+                lam_x[:active], z[:active], gathered[:active], y, workspace, out[:active], work,
+            )  # fmt: skip
             continue
         w = step_of_rows(
             tag, model, tables, member_state, history, count, w, fraction[:active], lam_q[:active], lam_v[:active],

@@ -100,6 +100,13 @@ def is_continuous(tag):
 
 
 @kernel
+def ends_in_stage(tag):
+    """Whether the last stage of a step is its end: that of the explicit methods is not, and of the implicit ones it is
+    so to Newton's tolerance only."""
+    return False
+
+
+@kernel
 def weights_of(tag, model, tables, history, w, out):
     """Weights of the stages in an integral: those of a velocity; see `method_interface.weights_of`."""
     table, stages = table_of_step(tag, model, tables, history, w)
@@ -116,6 +123,7 @@ COMMON: dict[str, Any] = {
     "carried": carried,
     "derivatives": derivatives,
     "is_continuous": is_continuous,
+    "ends_in_stage": ends_in_stage,
     "weights_of": weights_of,
 }
 implement(TAG, **COMMON)

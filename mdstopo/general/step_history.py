@@ -11,8 +11,10 @@ from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.general_model import GeneralModel
 from mdstopo.general.members import MODE, SET
+from mdstopo.general.strides import energy_column, pull_column
 from mdstopo.general.structures import bundle
-from mdstopo.general.switches import BOTH, DAMPED, SECOND
+from mdstopo.general.switches import BOTH, DAMPED, SECOND, STORED
+from mdstopo.mechanics.kinematics.kinematics_interface import add_pair_force
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
@@ -72,6 +74,13 @@ class StepHistory:
     stage_v: Annotated[FloatArray, Field("stages, n", "their velocities")]
     stage_a: Annotated[FloatArray, Field("stages, n", "their accelerations")]
     lam: Annotated[FloatArray, Field("stages, n_row", "multipliers of the joints (N, N m)")]
+    energy: Annotated[
+        FloatArray,
+        Field(
+            "stages, 2",
+            "of stages at ends of steps stored energy (J) and its rate (W), where a response is this energy",
+        ),
+    ]
     K: Annotated[
         FloatArray,
         Field(
@@ -191,6 +200,32 @@ def keep_stage(model, history, o, t, q, v, a, lam, workspace, tangent):
                 kept_pull[i] = pull[i]
         copy_vector(workspace.gram, history.gram[o])
         _copy(workspace.diagonal, history.diagonal[o])
+
+
+@kernel
+def keep_energy(model, history, o, v, workspace):
+    """Store the energy of design members at a stage, and its rate, where a response is this energy.
+
+    model: the compiled scene.
+    history, o: the history of steps (`StepHistory`), and the number of the stage.
+    v (n,): velocities.
+    workspace: workspace as the balance of the stage has left it; its right side x is overwritten.
+    """
+    if workspace.switches[STORED] == 0:
+        return
+    slope = workspace.x
+    energy = 0.0
+    rate = 0.0
+    for d in range(v.shape[0]):
+        slope[d] = 0.0
+    for p in range(model.pair.shape[0]):
+        sums = workspace.sums[p]
+        energy += sums[energy_column(model)]
+        add_pair_force(model, workspace.rel, p, sums, pull_column(model), slope)
+    for d in range(v.shape[0]):
+        rate += slope[d] * v[d]
+    history.energy[o, 0] = energy
+    history.energy[o, 1] = rate
 
 
 @kernel

@@ -15,7 +15,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.general.method_interface import is_explicit, scheme
 from mdstopo.general.projection import project
-from mdstopo.general.step_history import FIRST, has_factors, has_poses, keep_stage
+from mdstopo.general.step_history import FIRST, has_factors, has_poses, keep_energy, keep_stage
 from mdstopo.general.switches import APART, THOROUGH, UNFORMED
 from mdstopo.integrators.runge_kutta_tables import AA, BB, GENERAL, INSIDE, STAGES, VECTORS, A, B, C, D
 from mdstopo.integrators.steps import FORCES, TANGENTS
@@ -61,6 +61,8 @@ def make_stages(
             break
         if o >= 0:
             keep_stage(model, history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
+            if i == 0:
+                keep_energy(model, history, o, v[0], workspace)
     workspace.switches[THOROUGH] = 1
     workspace.switches[APART] = 0
     workspace.switches[UNFORMED] = 0

@@ -24,6 +24,7 @@ def __getattr__(name: str) -> type:
             dense_output,
             gauss_window,
             general_model,
+            generalized_alpha_step,
             priced_candidates,
             step_history,
         )

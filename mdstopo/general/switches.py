@@ -3,27 +3,31 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.general_model import CODE, INERTER, PAIR
+from mdstopo.general.general_model import CODE, ENERGY, INERTER, KIND, PAIR
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, load_slopes, rotations
 from mdstopo.mechanics.laws.law_table import SPRING
 
 #: places of a workspace's `switches`: whether the mass is diagonal; whether the factors in the workspace are those of
 #: the joints' matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small
 #: eigenvalue; whether tangents leave out the joints' part; whether loads may depend on how bodies turn (else `turn`
-#: stays zero); whether tangents are left as what they follow from: poses and sums over members of pairs, and the state
-DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING, UNFORMED = range(7)
+#: stays zero); whether tangents are left as what they follow from: poses and sums over members of pairs, and the state;
+#: whether a response is the stored energy, which is then kept at stages
+DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING, UNFORMED, STORED = range(8)
 #: which bodies of a pair move (`movers`)
 BOTH, SECOND, FIRST = 1, 2, 3
 
 
 @kernel
 def switches_of(model):
-    """The arrays (7,) of a new workspace for members that switch."""
-    switches = np.zeros(7, np.int64)
+    """The switches (8,) of a new workspace, for members that switch."""
+    switches = np.zeros(8, np.int64)
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
     switches[DAMPED] = 1 if is_damped(model) else 0
     switches[THOROUGH] = 1
     switches[TURNING] = 1 if loads_turn(model) else 0
+    for j in range(model.response.shape[0]):
+        if model.response[j, KIND] == ENERGY:
+            switches[STORED] = 1
     return switches
 
 

@@ -114,7 +114,10 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
     member = np.zeros((MEMBER, start))
     for group, block in zip(case.members, blocks, strict=True):
         _fill(group, block, member)
-    near = [_nearness(group, member, block) for group, block in zip(case.members, blocks, strict=True)]
+    near = [
+        nearness(group, member[[QX, QY], block[START] : block[STOP]].T, block[WIDTH] > 0)
+        for group, block in zip(case.members, blocks, strict=True)
+    ]
     return Members(
         pairs=np.array(list(pairs), dtype=np.int64).reshape(-1, 2),
         block=np.array(blocks, dtype=np.int64).reshape(-1, BLOCK),
@@ -125,17 +128,19 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
     )
 
 
-def _nearness(group: MemberGroup, member: FloatArray, block: list[int]) -> list[float]:
+def nearness(group: MemberGroup, second_ends: FloatArray, in_rows: bool) -> list[float]:
     """A row of `Model.near`: how far bodies may have moved for elongations to come from displacements.
+
+    second_ends (M, 2): in the axes of their body (m). in_rows: whether members are summed by the rows of a grid.
 
     That is a share of the longest member: beyond it displacements are no more accurate than lengths.
 
     In grids, whose kernels do not ask which is shorter, no end has moved by more than half of the shortest member.
     """
     far = NEAR * float(group.length.max())
-    if block[WIDTH]:
+    if in_rows:
         far = min(far, 0.25 * float(group.length.min()))
-    reach = float(np.hypot(*member[[QX, QY], block[START] : block[STOP]]).max())
+    reach = float(np.hypot(*second_ends.T).max())
     return [far**2, min(far / max(reach, 1e-300), 1.0) ** 2]
 
 

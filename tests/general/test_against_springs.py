@@ -8,10 +8,13 @@ import pytest
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
+from mdstopo.evaluation import Rows
 from mdstopo.general.compile_general import compile_general
-from mdstopo.general.general_driver import GeneralDriver
+from mdstopo.general.general_driver import GENERAL, GeneralDriver
 from mdstopo.integrators.integrator_choice import method_of
 from mdstopo.integrators.scene_driver import DriverOptions
+from mdstopo.mechanics.laws.spring import FAR
+from mdstopo.sensitivity.springs_driver import SPRINGS
 
 CASE = """
 format: 1
@@ -32,6 +35,9 @@ loads:
 design: {initial: 0.4, power: 1.5}
 objectives: {G: {response: energy, over_time: max}}
 """
+JOINT = """
+joints: [{name: pin, type: revolute, bodies: [torso, vehicle], at: [0, -0.5]}]
+"""
 
 
 @pytest.mark.parametrize("over_time", ["max", "min", "mean", "integral", "final"])
@@ -45,6 +51,32 @@ def test_values_and_gradients_agree(over_time):
     gradient = expected.gradients["G"]
     assert found.rows[0, 0, 1] == pytest.approx(expected.objectives["G"], rel=1e-9)
     assert np.abs(found.gradients[0, 0] - gradient).max() <= 1e-8 * max(float(np.abs(gradient).max()), 1e-12)
+
+
+@pytest.mark.parametrize("step", [0.008, 0.03])
+def test_short_steps_give_the_same_rows_and_sum_no_member_at_their_ends_anew(step):
+    """Four peaks and their gradients, of more steps than are gathered at once and of fewer."""
+    settings = {"solver.integrator": "generalized_alpha", "solver.step": str(step), "time.end": "1.5"}
+    case = read_case(CASE.replace("damping: 30, ", ""), overrides=settings)
+    rows = Rows(window=1.0, most=4)
+    expected = Evaluator(case).evaluate(case.initial, rows=rows).peaks["G"]
+    general = Evaluator(case, beyond="a comparison")
+    assert len(expected) == 4
+    for one, other in zip(general.evaluate(case.initial, rows=rows).peaks["G"], expected, strict=True):
+        assert one.value == pytest.approx(other.value, rel=1e-9)
+        assert np.abs(one.gradient - other.gradient).max() <= 1e-8 * np.abs(other.gradient).max()
+    work = general.evaluate(case.initial).work
+    assert work["sums_of_samples"] < 0.5 * work["steps"]  # both ends, and inside steps with the highest peak
+
+
+def test_how_far_bodies_may_move_for_displacements_to_tell_is_that_of_springs_alone():
+    case = read_case(CASE)
+    (scene,) = SPRINGS.scenes(case).values()
+    (general,) = GENERAL.scenes(case).values()
+    assert np.array_equal(general.model.law[:, FAR:], scene.model.near)
+    assert np.all(general.model.law[:, FAR:] > 0.0)
+    (jointed,) = GENERAL.scenes(read_case(CASE + JOINT)).values()
+    assert not jointed.model.law[:, FAR:].any()
 
 
 def test_a_scene_of_springs_keeps_its_own_kernels():

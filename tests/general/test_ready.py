@@ -29,3 +29,20 @@ def test_a_call_sees_the_arguments_that_it_is_given():
     assert out.tolist() == [-15.0, -6.0]
     ready("it", scaled, x, 1.0, True, out)
     assert out.tolist() == [5.0, 2.0]
+
+
+def test_a_call_of_which_few_arguments_change_sees_those():
+    ready, x, out = Ready(), np.array([1.0, 2.0]), np.zeros(2)
+
+    def asked(x, factor, out):
+        return ready.often("it", scaled, (x, out), ((1, factor),), lambda: (x, factor, True, out))
+
+    for factor in (2.0, 2.0, 3.0, 2.0):
+        assert asked(x, factor, out) == 2
+        assert out.tolist() == [factor, 2.0 * factor]
+    x[0] = 5.0
+    asked(x, 2.0, out)
+    assert out.tolist() == [10.0, 4.0]
+    other = np.zeros(2)
+    asked(x, 3.0, other)
+    assert (out.tolist(), other.tolist()) == ([10.0, 4.0], [15.0, 6.0])

@@ -12,6 +12,7 @@ from mdstopo.mechanics.kinematics import planar_grids
 from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.laws.law_table import SPRING
+from mdstopo.mechanics.laws.spring import FAR
 from mdstopo.mechanics.passes import SUMS
 from tests.space.in_python import in_python, same
 
@@ -138,3 +139,25 @@ def test_the_derivative_of_many_poses_is_the_sum_of_theirs(length: int) -> None:
     same(found, expected, 1e-13)
     assert not found[:START].any()
     assert not found[START + count :].any()
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("row", [11, 0])
+def test_far_from_home_elongations_are_differences_of_lengths_and_the_same(row: int) -> None:
+    """Springs one by one always take displacements; close to home those with the squares of FAR do so, too."""
+    (model, states), count, p = grid(11), ROWS * 11, law("elastic")
+    p[FAR:] = 1e-8
+    rel, u = np.zeros((2, 2, POSE)), np.random.default_rng(3).normal(size=(2, 2, 3))
+    states[0, START + count :] = 0.0
+    for s, near in enumerate((1.0, 1e-7)):
+        r = rel[s, 0] = pose(near)
+        found, usual, expected = np.zeros((3, SUMS))
+        KERNELS.spring_sums(model, p, START, count, row, True, states, r, True, found)
+        KERNELS.spring_sums(model, law("elastic"), START, count, row, True, states, r, True, usual)
+        KERNELS.member_sums(model, SPRING, p, START, count, True, 0.0, 0.0, states, r, True, expected)
+        same(found, expected, 1e-12)
+        assert np.array_equal(found, usual) == (near < 1e-3)
+    found, expected = np.zeros((2, WIDTH))
+    KERNELS.spring_designs(model, p, START, count, row, rel, u, 0, found)
+    KERNELS.spring_designs(model, law("elastic"), START, count, row, rel, u, 0, expected)
+    same(found, expected, 1e-12)

@@ -5,6 +5,9 @@ preload, too: with e = d - p of a row and r = a + e, a change of length sees a -
 Delta' = n . (d' + theta' (e_y, -e_x)). All is summed in units of the stiffness k, which is not zero. The last vector of
 a row begins early enough to end with it, and its lanes that the vector before has summed count as 0.
 
+Where bodies have moved so far from home that displacements are no more accurate than lengths, elongations are
+differences of lengths (`spring.hardly_moved`, with the squares that the law's parameters have from FAR on).
+
 Arguments: member (6 M,), the rows of `GeneralModel.member` behind each other, width M of each; start, count: the first
 member, and how many there are, without padding; length: members of a row, at least as many as a vector has; r (POSE,):
 the relative pose.
@@ -15,7 +18,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, load, store, total, unmarked, where_larger, zero
 from mdstopo.mechanics.grid_passes import PLACES
-from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, is_close
 from mdstopo.mechanics.laws.spring_grid import (
     add_column,
     add_member,
@@ -101,10 +104,12 @@ def _sum_tile(member, width, scale, start, first, last, length, p, r, counted, t
       room (rows, 4): scratch.
     """
     elastic_alone = p[1] == 0.0 and p[2] == 0.0
+    close = is_close(r, p)
     _begin_rows(member, width, start, length, r, room)
     damping = p[1] / p[0]
     preload = p[2] / p[0]
     nothing = zero()
+    nothing_moved = nothing, nothing, nothing
     sums = no_columns()
     energy = nothing
     pulls = nothing, nothing, nothing
@@ -114,7 +119,7 @@ def _sum_tile(member, width, scale, start, first, last, length, p, r, counted, t
         i = min(begin, length - lanes())
         done = (1 << (begin - i)) - 1
         ax, ay = turned_columns(qx, qy, i, r[2], r[3])
-        moved = moved_columns(qx, qy, i, r)
+        moved = moved_columns(qx, qy, i, r) if close else nothing_moved
         own = no_members()
         pull_x = nothing
         pull_y = nothing
@@ -123,7 +128,7 @@ def _sum_tile(member, width, scale, start, first, last, length, p, r, counted, t
         for j in range(room.shape[0]):
             following = seen_in_row(ax, ay, room, min(j + 1, room.shape[0] - 1))
             rx, ry, r2, y = seen
-            stretch = _stretch(moved, seen, load(member, L0 * width + at), load(member, EXCESS * width + at))
+            stretch = _stretch(moved, seen, load(member, L0 * width + at), member, EXCESS * width + at, close)
             s = unmarked(load(scale, at), done)
             elastic = s * stretch
             w = elastic * y
@@ -155,25 +160,30 @@ def _sum_tile(member, width, scale, start, first, last, length, p, r, counted, t
 
 
 @part
-def _stretch(moved, seen, free, excess):
+def _stretch(moved, seen, free, member, excess, close):
     """Delta of members of one row (m), as `spring.elongation` has it, in vectors.
 
-    moved: of their columns. seen: r, L^2 and 1/L (m, m^2, 1/m). free, excess: l0 (m) and L0^2 - l0^2 (m^2).
+    moved: of their columns. seen: r, L^2 and 1/L (m, m^2, 1/m). free: l0 (m).
+    member, excess: the rows of members, and where in it L0^2 - l0^2 (m^2) of these begins.
+    close: whether elongations come from displacements.
     """
     rx, ry, r2, y = seen
-    twice_x, twice_y, squared = moved
     x = r2 * y - free
-    off = 0.5 * y * (x * (r2 * y + free) - ((excess - squared) + (twice_x * rx + twice_y * ry)))
-    return x - where_larger(r2 - squared, 0.0, off)
+    if close:
+        twice_x, twice_y, squared = moved
+        along = twice_x * rx + twice_y * ry
+        off = 0.5 * y * (x * (r2 * y + free) - ((load(member, excess) - squared) + along))
+        x = x - where_larger(r2 - squared, 0.0, off)
+    return x
 
 
 @kernel
-def grid_designs(member, width, start, count, length, k, rel, u, pair, out):
+def grid_designs(member, width, start, count, length, p, rel, u, pair, out):
     """Add sum_j f (b . u_j) over S poses of each spring, without damping and preload, at alpha^mu = 1.
 
     In:
       member, width, start, count, length: as above.
-      k: stiffness (N/m).
+      p (8,): parameters of the law, of which the stiffness (N/m) counts.
       rel (S, n_pair, POSE): relative poses.
       u (S, n_pair, 3): virtual changes of these.
       pair: number of the pair.
@@ -184,12 +194,15 @@ def grid_designs(member, width, start, count, length, k, rel, u, pair, out):
     tall = _tall(rows, count)
     room = np.empty((tall, rel.shape[0], 4))
     turned = np.empty((rel.shape[0], 5, lanes()))
+    close = np.empty(rel.shape[0], np.bool_)
+    for m in range(close.shape[0]):
+        close[m] = is_close(rel[m, pair], p)
     for row in range(0, rows, tall):
         own = room[: min(tall, rows - row)]
         at = start + row * length
         _begin_designs(member, width, at, length, rel, u, pair, own)
         for begin in range(0, length, lanes()):
-            _design_columns(member, width, at, begin, length, k, rel, pair, own, turned, out)
+            _design_columns(member, width, at, begin, length, p[0], rel, pair, close, own, turned, out)
 
 
 @part
@@ -210,11 +223,12 @@ def _begin_designs(member, width, at, length, rel, u, pair, room):
 
 
 @part
-def _design_columns(member, width, start, begin, length, k, rel, pair, room, turned, out):
+def _design_columns(member, width, start, begin, length, k, rel, pair, close, room, turned, out):
     """`grid_designs` of a vector of columns of a tile.
 
     In:
-      member, width, length, k, rel, pair: as of `grid_designs`.
+      member, width, length, rel, pair: as of `grid_designs`. k: stiffness (N/m).
+      close (S,): whether elongations come from displacements at the poses.
       start: the first member of the tile's first row. begin: the first column.
       room (rows, S, 4): of `_begin_designs`.
     Out:
@@ -228,20 +242,20 @@ def _design_columns(member, width, start, begin, length, k, rel, pair, room, tur
     for m in range(turned.shape[0]):
         r = rel[m, pair]
         ax, ay = turned_columns(qx, qy, i, r[2], r[3])
-        twice_x, twice_y, squared = moved_columns(qx, qy, i, r)
         store(turned[m, 0], 0, ax)
         store(turned[m, 1], 0, ay)
-        store(turned[m, 2], 0, twice_x)
-        store(turned[m, 3], 0, twice_y)
-        store(turned[m, 4], 0, squared)
+        if close[m]:
+            twice_x, twice_y, squared = moved_columns(qx, qy, i, r)
+            store(turned[m, 2], 0, twice_x)
+            store(turned[m, 3], 0, twice_y)
+            store(turned[m, 4], 0, squared)
     at = start + i
     for j in range(room.shape[0]):
         free = load(member, L0 * width + at)
-        excess = load(member, EXCESS * width + at)
         work = zero()
         for m in range(turned.shape[0]):
             seen = seen_at(turned, room, j, m)
-            stretch = _stretch(moved_at(turned, m), seen, free, excess)
+            stretch = _stretch(moved_at(turned, m), seen, free, member, EXCESS * width + at, close[m])
             work = work + stretch * seen[3] * (seen[0] * room[j, m, 2] + seen[1] * room[j, m, 3])
         store(out, at, load(out, at) + k * unmarked(work, done))
         at += length

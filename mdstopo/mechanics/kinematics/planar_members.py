@@ -28,7 +28,13 @@ from mdstopo.mechanics.laws.alike import (
     far,
 )
 from mdstopo.mechanics.laws.law_table import SPRING, law, law_is_idle
-from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent, elongation_of
+from mdstopo.mechanics.laws.spring import (
+    ZERO_LENGTH_SQUARED,
+    elastic_force,
+    elastic_tangent,
+    elongation_of,
+    is_close,
+)
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.scene.springs_model import EXCESS, HOME_X, HOME_Y, L0, PX, PY, QX, QY
 
@@ -239,11 +245,11 @@ def _springs_of_no_grid(rows, width, scale, start, stop, p, r, counted, tangent,
         if tangent:
             alike_tangent(rows, width, scale, start, stop, p, r, o)
     elif tangent:
-        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r, np.bool_(True))
+        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r, is_close(r, p))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
         add_tangent((c * kxx, c * kxy, c * kyy, c * kxt, c * kyt, c * ktt), o)
     else:
-        x, y, t, e = elastic_force(rows, width, scale, start, stop, r, np.bool_(True))
+        x, y, t, e = elastic_force(rows, width, scale, start, stop, r, is_close(r, p))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
 
 
@@ -282,7 +288,7 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     width = model.member.shape[1]
     rows = model.member.reshape(model.member.size)
     if row > 0:
-        grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, out)
+        grid_designs(rows, width, lo, count, row, p, rel, u, pair, out)
     else:
         elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
 

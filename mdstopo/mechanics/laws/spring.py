@@ -65,6 +65,17 @@ def hardly_moved(r, near):
     return r[10] * r[10] + r[11] * r[11] < near[0] and r[12] * r[12] + r[13] * r[13] < near[1]
 
 
+#: where among a spring's parameters in a general scene a row of `Model.near` begins; zeros: elongations come from
+#: displacements wherever bodies are
+FAR = 6
+
+
+@part
+def is_close(r, p):
+    """`hardly_moved` at a pose r (POSE,) by the parameters p (8,) of a spring."""
+    return p[FAR] == 0.0 or hardly_moved(r, p[FAR : FAR + 2])
+
+
 @part
 def elongation(rx, ry, r2, y, ux, uy, free, excess):
     """Delta = L - l0 of members, in vectors (m).
