@@ -90,7 +90,7 @@ def make_stages(
         if singular >= 0:
             return singular
         if o >= 0:
-            keep_stage(model, history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
+            keep_stage(history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
     damp_error(model, table, stop, h, workspace, a)
     return singular
 

@@ -11,7 +11,7 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.general_contact import add_contacts
 from mdstopo.general.general_model import CODE, COUNT, INERTER, PAIR, START
 from mdstopo.general.members import SCALE, general_sums
-from mdstopo.general.strides import FORCE, pair_freedoms, place_in_pair, sums_size, tangent_column
+from mdstopo.general.strides import FORCE, pair_freedoms, place_in_pair, tangent_column
 from mdstopo.general.switches import APART, DAMPED, TURNING, UNFORMED
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_bushings,
@@ -153,7 +153,7 @@ def place_pairs(model, q, v, tangent, workspace, rel, sums):
     for p in range(model.pair.shape[0]):
         if workspace.carries[p] != 0:
             turned_pose(model, p, workspace.turned, q, v, rel)
-            for i in range(sums_size(model) if tangent else tangent_column(model)):
+            for i in range(sums.shape[1] if tangent else tangent_column(model)):
                 sums[p, i] = 0.0
 
 

@@ -165,7 +165,7 @@ def advance(
         if singular >= 0:
             return SINGULAR, stages, singular
         if o >= 0:
-            keep_stage(model, history, o, t, q, v, a, lam, workspace, yes)
+            keep_stage(history, o, t, q, v, a, lam, workspace, yes)
         stages = 1
         copy_vector(a, x)
         if lag > 0.0 and h * rate_of(model, workspace) < RESOLVED:
@@ -179,7 +179,7 @@ def advance(
             if singular >= 0:
                 return SINGULAR, stages, singular
             if o >= 0:
-                keep_stage(model, history, o + 1, t + ahead, q, v, balanced, lam, workspace, yes)
+                keep_stage(history, o + 1, t + ahead, q, v, balanced, lam, workspace, yes)
             stages = 2
             for d in range(n):
                 x[d] = 2.0 * a[d] - balanced[d]
@@ -237,7 +237,7 @@ def advance(
         # the multipliers that belong to the corrected accelerations
         for r in range(n_row):
             lam[r] += row[r]
-        keep_stage(model, history, o + stages, t + h, q, v, now, lam, workspace, yes)
+        keep_stage(history, o + stages, t + h, q, v, now, lam, workspace, yes)
         keep_energy(model, history, o + stages, v, workspace)
     copy_vector(q, end_q)
     copy_vector(v, ends[VELOCITY])

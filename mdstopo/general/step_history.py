@@ -154,52 +154,67 @@ def carve_history(model, limits, floats, ints):
 
 
 @kernel
-def keep_stage(model, history, o, t, q, v, a, lam, workspace, tangent):
+def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
     """Store the state, accelerations and tangents of a stage.
 
-    model: the compiled scene.
     history: the history of steps (`StepHistory`).
     o: number of the stage.
     t: time (s).
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     lam (n_row,): multipliers of the joints.
     workspace: workspace as the balance of the stage has left it.
-    tangent: whether its tangents are stored, and the factors of the joints' matrix where these are kept.
+    tangent: whether its tangents are stored; where factors are kept, all of these is in place (`keep_in_place`).
     """
     history.when[o] = t
     copy_vector(q, history.stage_q[o])
     copy_vector(v, history.stage_v[o])
     copy_vector(a, history.stage_a[o])
     copy_vector(lam, history.lam[o])
-    if not tangent:
+    if not tangent or has_factors(history):
         return
-    if not has_poses(history):
-        _copy(workspace.turn, history.turn[o])
-    damped = workspace.switches[DAMPED] != 0  # else nobody reads C
-    apart = has_factors(history)
-    for p in range(workspace.k.shape[0]):
-        kept = workspace.carries[p] if apart else BOTH
-        if has_poses(history):
-            if kept != 0:
-                copy_vector(workspace.rel[p], history.rel[o, p])
-                own = history.sums[o, p]
-                copy_vector(workspace.sums[p, : own.shape[0]], own)
-            continue
-        copy_carried(kept, workspace.k[p], history.K[o, p])
-        if damped:
-            copy_carried(kept, workspace.c[p], history.C[o, p])
+    _copy(workspace.turn, history.turn[o])
+    _copy(workspace.k, history.K[o])
+    if workspace.switches[DAMPED] != 0:  # else nobody reads C
+        _copy(workspace.c, history.C[o])
     if history.mass.shape[0] > 1:
         _copy(workspace.mass, history.mass[o])
-    if apart:
-        _copy(workspace.turned, history.turned[o])
-        pull = workspace.pull.reshape(workspace.pull.size)
-        kept_pull = history.pull[o].reshape(pull.size)
-        for r in range(model.row_layout.shape[0]):  # joints have room for more rows than most have
-            first = model.row_layout[r, 0]
-            for i in range(first, first + workspace.pull.shape[2]):
-                kept_pull[i] = pull[i]
-        copy_vector(workspace.gram, history.gram[o])
-        _copy(workspace.diagonal, history.diagonal[o])
+
+
+@part
+def own_arrays(workspace):
+    """The arrays of a workspace in whose place `keep_in_place` puts others."""
+    joints = workspace.turned, workspace.pull, workspace.gram, workspace.diagonal
+    return joints, (workspace.rel, workspace.sums), (workspace.k, workspace.c, workspace.turn)
+
+
+@part
+def keep_in_place(history, o, workspace):
+    """Have the balance of a stage write into the history what is kept of it where factors are: nothing is copied then.
+
+    history: the history of steps (`StepHistory`).
+    o: number of the stage.
+    workspace: workspace of a balance, whose arrays become those of the history.
+    """
+    workspace.turned = history.turned[o]
+    workspace.pull = history.pull[o]
+    workspace.gram = history.gram[o]
+    workspace.diagonal = history.diagonal[o]
+    if has_poses(history):
+        workspace.rel = history.rel[o]
+        workspace.sums = history.sums[o]
+    else:
+        workspace.k = history.K[o]
+        workspace.c = history.C[o]
+        workspace.turn = history.turn[o]
+
+
+@part
+def take_back(workspace, own):
+    """Give a workspace its own arrays back, those of `own_arrays`."""
+    joints, poses, tangents = own
+    workspace.turned, workspace.pull, workspace.gram, workspace.diagonal = joints
+    workspace.rel, workspace.sums = poses
+    workspace.k, workspace.c, workspace.turn = tangents
 
 
 @kernel
@@ -219,6 +234,8 @@ def keep_energy(model, history, o, v, workspace):
     for d in range(v.shape[0]):
         slope[d] = 0.0
     for p in range(model.pair.shape[0]):
+        if workspace.carries[p] == 0:  # without members; nothing is written of it into a history
+            continue
         sums = workspace.sums[p]
         energy += sums[energy_column(model)]
         add_pair_force(model, workspace.rel, p, sums, pull_column(model), slope)

@@ -15,7 +15,16 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.general.method_interface import is_explicit, scheme
 from mdstopo.general.projection import project
-from mdstopo.general.step_history import FIRST, has_factors, has_poses, keep_energy, keep_stage
+from mdstopo.general.step_history import (
+    FIRST,
+    has_factors,
+    has_poses,
+    keep_energy,
+    keep_in_place,
+    keep_stage,
+    own_arrays,
+    take_back,
+)
 from mdstopo.general.switches import APART, THOROUGH, UNFORMED
 from mdstopo.integrators.runge_kutta_tables import AA, BB, GENERAL, INSIDE, STAGES, VECTORS, A, B, C, D
 from mdstopo.integrators.steps import FORCES, TANGENTS
@@ -49,8 +58,11 @@ def make_stages(
     workspace.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
     workspace.switches[APART] = 1 if has_factors(history) else 0
     workspace.switches[UNFORMED] = 1 if has_poses(history) else 0
+    own = own_arrays(workspace)
     singular = -1
     for i in range(first, stop):
+        if tangent and o >= 0 and has_factors(history):
+            keep_in_place(history, o + i, workspace)
         stage_state(model, table, h, i, q0, v0, q, v, a, workspace.slopes)
         time = t + h * table[VECTORS, C, i]
         singular = solve_accelerations(model, member_state, segment, time, q[i], v[i], tangent, workspace, a[i], lam)
@@ -60,9 +72,10 @@ def make_stages(
         if singular >= 0:
             break
         if o >= 0:
-            keep_stage(model, history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
+            keep_stage(history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
             if i == 0:
                 keep_energy(model, history, o, v[0], workspace)
+    take_back(workspace, own)
     workspace.switches[THOROUGH] = 1
     workspace.switches[APART] = 0
     workspace.switches[UNFORMED] = 0
