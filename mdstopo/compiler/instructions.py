@@ -50,6 +50,7 @@ class Builder(ir.IRBuilder):  # type: ignore[misc]  # llvmlite is not typed
         #: what was stored in the parts of a place in a block, in this order
         self._stored: dict[tuple[int, int], list[tuple[_Path, Any]]] = {}
         self._at_end = True
+        self._follows = True
         #: whether the function catches what others raise
         self.catches = False
 
@@ -107,7 +108,7 @@ class Builder(ir.IRBuilder):  # type: ignore[misc]  # llvmlite is not typed
     def alloca(self, typ: Any, size: Any = None, name: str = "") -> Any:
         """A place."""
         made = super().alloca(typ, size, name)
-        if size is None:
+        if size is None and self._follows:
             self._places[id(made)] = id(made), ()
             self._pointers[id(made)] = [id(made)]
         return made
@@ -194,6 +195,24 @@ class Builder(ir.IRBuilder):  # type: ignore[misc]  # llvmlite is not typed
             return lhs if known else rhs
         self._share(lhs, rhs)
         return super().select(cond, lhs, rhs, *rest, **named)
+
+    def addrspacecast(self, value: Any, typ: Any, name: str = "") -> Any:
+        """The same address in another space."""
+        self._share(value)
+        return super().addrspacecast(value, typ, name)
+
+    def atomic_rmw(self, op: str, ptr: Any, val: Any, ordering: str, name: str = "") -> Any:
+        """Change what others may change as well."""
+        self._share(ptr, val)
+        return super().atomic_rmw(op, ptr, val, ordering, name)
+
+    def phi(self, typ: Any, name: str = "", flags: Iterable[str] = ()) -> Any:
+        """A value by the block that one comes from; of addresses it may be any, and no place is followed any more."""
+        if isinstance(typ, ir.PointerType):
+            self._follows = False
+            self._places.clear()
+            self._pointers.clear()
+        return super().phi(typ, name, flags)
 
     # Arithmetic with constants
 
