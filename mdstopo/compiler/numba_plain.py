@@ -88,3 +88,10 @@ def enter_threads() -> None:
             return counter[0] - 1
 
         return first
+
+
+def enter_structure(maker: type, kind: type, fields: tuple[str, ...]) -> None:
+    """Have `maker(...)` make a structure of a kind."""
+    from numba.experimental import structref
+
+    structref.define_constructor(maker, kind, list(fields))
