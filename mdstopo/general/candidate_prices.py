@@ -11,6 +11,7 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.compiler.threads import shared, taken
 from mdstopo.general.general_model import INERTER, unpack_general
+from mdstopo.general.loaded_members import load_members
 from mdstopo.general.members import MODE
 from mdstopo.general.priced_candidates import (
     CODE,
@@ -24,7 +25,7 @@ from mdstopo.general.priced_candidates import (
     unpack_candidates,
 )
 from mdstopo.general.switching_prices import ROW, make_following, price_followed
-from mdstopo.general.tile_sweep import load_members, make_lists, price_run
+from mdstopo.general.tile_sweep import make_lists, price_run
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     has_spring_energies,
     member_designs,

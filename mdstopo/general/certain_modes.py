@@ -16,10 +16,6 @@ reach r that neither |w| nor |h| exceeds, the rate is
 What is linear in the s of both points is largest where these are 1 or -1. A bulge b adds b to the length, and
 b (|v| / L + |S'|) to the rate. So elongations and rates have bounds whose width beyond the linear part falls with the
 square of the part. Bounds of a margin follow where it is the least of linear functions: at the corners.
-
-All members may leave a mode between the same two nodes by two switches of a formula, which they need not reach in the
-same order. Their prices then have a kink where both are reached at once. It divides the part, so it shows in the prices
-of a few, too.
 """
 
 import math
@@ -53,8 +49,11 @@ from mdstopo.mechanics.laws.law_table import (
 )
 from mdstopo.sensitivity.tile_interpolation import BROAD, LEVELS, TALL
 
+#: how often a tile is halved for bounds, and one more; columns of the smallest parts
+BOUND_LEVELS = LEVELS + 2
+NARROW = BROAD >> (BOUND_LEVELS - 1)
 #: parts of a tile of all levels, of which those of a level begin at 2^level - 1; the place of its rows behind them
-PARTS_OF_ALL = 2**LEVELS - 1
+PARTS_OF_ALL = 2**BOUND_LEVELS - 1
 ROWS_OF_ALL = PARTS_OF_ALL
 #: points in body frames, and where their case has them; the middle of their line, and half of it
 LOCAL, STATED = range(2)
@@ -103,7 +102,7 @@ def fill_spans(candidates, k, i, j, spans):
     bulge = 0.0
     for which in range(2):
         bulge = max(bulge, _fill_line(grids[which], i * TALL, height, line[ROWS_OF_ALL, which]))
-    for level in range(LEVELS):
+    for level in range(BOUND_LEVELS):
         size = BROAD >> level
         for at in range(1 << level):
             if (at + 1) * size > width:
@@ -322,8 +321,41 @@ def _is_over(code, p, curves, rest, t, mode, low, high, bound):
 
 
 @kernel
+def modes_at_nodes(model, candidates, k, s, which, spans, mode):
+    """In which mode all members of a part are at each node of a step, by a law that does not remember.
+
+    In:
+      model: with the numbers of the laws.
+      candidates, k: a `PricedCandidates`, and the number of the run.
+      s: number of the step.
+      which: number of the part.
+    Out:
+      mode (NODES,): of all, or UNSURE where bounds do not tell.
+      spans: of `make_spans`, of which the bounds are overwritten.
+    """
+    code = candidates.run[k, CODE]
+    p = candidates.law[k]
+    curves = model.curves
+    line, number, w, bound = spans
+    rest = number[which, FREE]
+    axes = freedoms(model) - rotations(model)
+    for m in range(NODES):
+        mode[m] = UNSURE
+        o = candidates.step[s, FIRST_NODE] + m
+        t = candidates.step_time[s, 0] + NODE[m] * candidates.step_time[s, 1]
+        rows = line[ROWS_OF_ALL]
+        if not _fill_bounds(axes, candidates.node_frame, o, line[which], rows, number[which], w, bound):
+            continue
+        x = 0.5 * (bound[LOW] + bound[HIGH])
+        rate = 0.5 * (bound[SLOWEST] + bound[FASTEST])
+        now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+        if _holds(code, p, curves, rest, t, now, 0.0, 0.0, bound):
+            mode[m] = now
+
+
+@kernel
 def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
-    """What is known of the modes of all members of a part in a step, or in a state.
+    """What is known of the modes of all members of a part in a step by a law that remembers, or in a state.
 
     In:
       model: with the numbers of the laws.
@@ -380,11 +412,7 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
             return UNSURE, UNSURE
         if not _is_over(code, p, curves, rest, t, now, low, high, bound):
             return UNSURE, UNSURE
-        new = np.int64(now)
-        if remembers:
-            new = np.int64(law_next(code, p, x, rate, 0.0, now, t, curves, rest))
-        else:
-            new = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+        new = np.int64(law_next(code, p, x, rate, 0.0, now, t, curves, rest))
         if new == now or law_makes_set(code, now, new):
             return UNSURE, UNSURE
         if not _holds(code, p, curves, rest, t, new, low, high, bound):

@@ -263,7 +263,7 @@ def _add_stages(model, candidates, k, at, count, s, quick, following, price):
 
 
 @part
-def _range_of(x, count):
+def range_of(x, count):
     """The least and the largest of the first numbers of x, of which there are so many."""
     low = x[0]
     high = x[0]
@@ -280,6 +280,53 @@ def _range_of(x, count):
         low = min(low, x[i])
         high = max(high, x[i])
     return low, high
+
+
+@part
+def fill_law(code, p, curves, t, value, low, high, mode, node, power):
+    """Force and energy of a law that is a polynomial (`Modes.degree`), by powers of (x - middle) / half.
+
+    In:
+      code, p (8,), curves: the law, and numbers of all laws.
+      t, value: time (s), and the law's tabulated force then (N).
+      low, high: between which elongations they are wanted (m).
+      mode: the mode.
+    Out:
+      power (2 or more, 5 or more): coefficients of the force and of the energy.
+      node (2 or more, 5 or more): scratch.
+
+    Returns the middle of the elongations, the inverse of half their range, the slope of the force by the rate, and how
+    many coefficients there are.
+    """
+    middle = 0.5 * (low + high)
+    half = max(0.5 * (high - low), 1e-6 * (1.0 + abs(middle)))
+    five = np.int64(0) if law_degree(code) == 1 else np.int64(1)
+    places = 5 if five == 1 else 3
+    by_rate = 0.0
+    for m in range(places):
+        f, _, by_rate, energy, _ = law(
+            code, p, middle + half * PLACE[five, m], 0.0, mode, t, value, curves, 1.0
+        )  # fmt: skip
+        node[0, m] = f
+        node[1, m] = energy
+    for a in range(places):
+        force = 0.0
+        stored = 0.0
+        for m in range(places):
+            force += FROM_PLACES[five, a, m] * node[0, m]
+            stored += FROM_PLACES[five, a, m] * node[1, m]
+        power[0, a] = force
+        power[1, a] = stored
+    return middle, 1.0 / half, by_rate, places
+
+
+@part
+def at_places(power, places, s):
+    """The polynomial with so many coefficients, at a vector s."""
+    value = zero() + power[places - 1]
+    for a in range(places - 2, -1, -1):
+        value = value * s + power[a]
+    return value
 
 
 @kernel
@@ -299,37 +346,46 @@ def add_polynomial(code, p, curves, t, value, weight, works, count, mode, node, 
       node, power (2 or more, 5 or more): scratch.
     """
     x = works[ELONGATION]
-    low, high = _range_of(x, count)
-    middle = 0.5 * (low + high)
-    half = max(0.5 * (high - low), 1e-6 * (1.0 + abs(middle)))
-    five = np.int64(0) if law_degree(code) == 1 else np.int64(1)
-    places = 5 if five == 1 else 3
-    by_rate = 0.0
-    for m in range(places):
-        f, _, by_rate, energy, _ = law(
-            code, p, middle + half * PLACE[five, m], 0.0, mode, t, value, curves, 1.0
-        )  # fmt: skip
-        node[0, m] = f
-        node[1, m] = energy
+    low, high = range_of(x, count)
+    middle, inverse, by_rate, places = fill_law(code, p, curves, t, value, low, high, mode, node, power)
     for a in range(places):
-        force = 0.0
-        stored = 0.0
-        for m in range(places):
-            force += FROM_PLACES[five, a, m] * node[0, m]
-            stored += FROM_PLACES[five, a, m] * node[1, m]
-        power[0, a] = force
-        power[1, a] = weight * stored
-    inverse = 1.0 / half
+        power[1, a] *= weight
     for i in range(0, count, lanes()):
         s = (load(x, i) - middle) * inverse
-        force = zero() + power[0, places - 1]
-        stored = zero() + power[1, places - 1]
-        for a in range(places - 2, -1, -1):
-            force = force * s + power[0, a]
-            stored = stored * s + power[1, a]
-        work = (force + by_rate * load(works[RATE], i)) * load(works[ALONG], i)
-        there = load(works[INVERSE], i)
-        store(price, i, load(price, i) + (work + where_larger(there, 0.0, stored)))
+        work = (at_places(power[0], places, s) + by_rate * load(works[RATE], i)) * load(works[ALONG], i)
+        if weight != 0.0:
+            work += where_larger(load(works[INVERSE], i), 0.0, at_places(power[1], places, s))
+        store(price, i, load(price, i) + work)
+
+
+@kernel
+def add_pieces(code, p, curves, t, value, weight, works, count, node, power, price):
+    """What `add_polynomial` does of members in any of the modes of a law whose modes are pieces of one function, which
+    follow each other along the elongation.
+
+    code, p, curves, t, value, weight, works, count, node, power, price: as there.
+    """
+    x = works[ELONGATION]
+    low, high = range_of(x, count)
+    last = np.int64(law_start(code, p, high, 0.0, 0.0, t, curves, 1.0))
+    # before the first piece there is no other, and behind the last one
+    begin = -np.inf
+    for mode in range(np.int64(law_start(code, p, low, 0.0, 0.0, t, curves, 1.0)), last + 1):
+        end = np.inf if mode == last else high + law_margin(code, p, high, 0.0, mode, t, curves, 1.0)
+        # over its own part of the elongations: a steep piece is large beyond it
+        least = max(low, begin)
+        most = max(min(high, end), least)
+        middle, inverse, by_rate, places = fill_law(code, p, curves, t, value, least, most, mode, node, power)
+        for i in range(0, count, lanes()):
+            own = load(x, i)
+            s = (own - middle) * inverse
+            work = (at_places(power[0], places, s) + by_rate * load(works[RATE], i)) * load(works[ALONG], i)
+            work += weight * at_places(power[1], places, s)
+            work = where_larger(load(works[INVERSE], i), 0.0, work)
+            # that of members behind the end of the piece is taken away again, to the bit
+            within = where_larger(own, begin, work) - where_larger(own, end, work)
+            store(price, i, load(price, i) + within)
+        begin = end
 
 
 @kernel

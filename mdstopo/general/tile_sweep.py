@@ -3,8 +3,8 @@
 A price is a sum over steps. In a step in which bounds show that all members of a part of the tile stay in one mode
 (`certain_modes`), or all leave it for the same other one, what they do is as smooth in where their ends are as by a
 law without modes: it is computed for a few members, and follows for the others (`sensitivity.tile_interpolation`).
-That is tried with the whole tile, then with its halves, down to the smallest parts; in the steps that are left members
-are followed one by one.
+In other steps members are sorted by what they do (`sorted_sweep`): those of the whole tile, or of the largest parts
+whose points are evenly spread, where a law does not remember; else of the smallest parts, after all larger ones.
 
 Where a law remembers, steps are gone through in the order of time, with the mode and the permanent set that each member
 has. Once the sets differ, what the members of a part do is a polynomial of the second degree in their sets, too.
@@ -13,8 +13,8 @@ has. Once the sets differ, what the members of a part do is a polynomial of the 
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.certain_modes import LEAVES, PARTS_OF_ALL, UNSURE, fill_spans, make_spans, modes_in_step
-from mdstopo.general.general_model import MEMBER_EXCESS, MEMBER_FREE_LENGTH
+from mdstopo.general.certain_modes import LEAVES, UNSURE, fill_spans, make_spans, modes_at_nodes, modes_in_step
+from mdstopo.general.loaded_members import add_states, load_all, load_members, loaded_at
 from mdstopo.general.priced_candidates import (
     CODE,
     FIRST_STAGE,
@@ -33,16 +33,12 @@ from mdstopo.general.priced_candidates import (
     SCENE,
     WHOLE,
 )
-from mdstopo.general.switching_prices import (
-    ROW,
-    add_in_mode,
-    add_polynomial,
-    make_following,
-    price_point,
-    price_step,
-)
-from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, WORKS, member_works
-from mdstopo.mechanics.laws.law_table import law_degree, law_is_idle, law_remembers
+from mdstopo.general.sorted_members import UNSORTED, make_sorting, modes_of_all
+from mdstopo.general.sorted_sweep import LOADED, NO_LEVEL, price_part
+from mdstopo.general.switching_prices import ROW, add_pieces, make_following, price_point, price_step
+from mdstopo.general.switching_together import make_switching
+from mdstopo.mechanics.kinematics.kinematics_interface import WORKS, member_works
+from mdstopo.mechanics.laws.law_table import law_is_idle, law_remembers
 from mdstopo.sensitivity.tile_interpolation import (
     BROAD,
     LEVELS,
@@ -58,46 +54,13 @@ from mdstopo.sensitivity.tile_interpolation import (
     take_prices,
 )
 
+#: parts of a tile of all levels that have lists, of which those of a level begin at 2^level - 1
+PARTS_OF_ALL = 2**LEVELS - 1
 #: of each part: the mode that all its members are in, UNSURE where they differ; their least and largest permanent sets
 SHARED = 3
 SAME, LEAST, MOST = range(SHARED)
 #: sets at which a part whose members differ in these is priced
 SETS = 3
-#: place behind those of the smallest parts: whether all members of the tile are in the model
-LOADED = PARTS
-
-
-@kernel
-def load_members(model, candidates, k, index, count, at):
-    """Put some members into the model.
-
-    In:
-      candidates, k: a `PricedCandidates`, and the number of the run.
-      index (2, count or more): numbers of their points.
-      count, at: how many there are, and where they go.
-    Out:
-      model: its members, and the numbers of its laws.
-    """
-    axes = candidates.first.shape[1]
-    scene = candidates.run[k, SCENE]
-    rest = candidates.rest[k]
-    for d in range(axes):
-        for i in range(count):
-            model.member[d, at + i] = candidates.first[scene, d, index[0, i]]
-            model.member[axes + d, at + i] = candidates.second[scene, d, index[1, i]]
-    for i in range(candidates.curves.shape[1]):
-        model.curves[i] = candidates.curves[scene, i]
-    for i in range(count):
-        home = 0.0
-        stated = 0.0
-        for d in range(axes):
-            home += (candidates.second_home[scene, d, index[1, i]] - candidates.first_home[scene, d, index[0, i]]) ** 2
-            apart = candidates.second_stated[scene, d, index[1, i]] - candidates.first_stated[scene, d, index[0, i]]
-            stated += apart * apart
-        start = np.sqrt(home)
-        free = np.sqrt(stated) if rest < 0.0 else rest
-        model.member[MEMBER_FREE_LENGTH, at + i] = free
-        model.member[MEMBER_EXCESS, at + i] = (start - free) * (start + free)
 
 
 @kernel
@@ -142,7 +105,7 @@ def price_run(model, candidates, k, tile, scratch, lists, price):
     """
     run = candidates.run[k]
     spans = make_spans(candidates.first.shape[1])
-    buffers = (scratch, lists, spans, make_following())
+    buffers = (scratch, lists, spans, make_following(), make_sorting(), make_switching())
     _, i, j, _ = tile
     _, _, count, shared, modes, sets, todo, _, _, _, _ = lists
     for n in range(candidates.curves.shape[1]):
@@ -161,6 +124,9 @@ def price_run(model, candidates, k, tile, scratch, lists, price):
     done = 0.0
     for u in range(steps):
         if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, MOVES] == 0:
+            continue
+        if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
+            done += _price_sorted(model, candidates, k, u, tile, buffers, price)
             continue
         done += _price_next(model, candidates, k, u, begun, ends, tile, buffers, price)
         if followed and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
@@ -181,7 +147,8 @@ def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
       begun: whether members are in modes.
       ends: 1 where the last step was a part of one, and those of states alone are in `modes[1]`; else 0.
     In place:
-      buffers: of `make_scratch`, `make_lists`, `make_spans` and `make_following`, of which the lists matter.
+      buffers: of `make_scratch`, `make_lists`, `make_spans`, `make_following`, `make_sorting` and `make_switching`, of
+        which the lists matter.
       price (PLACES,): added to.
 
     Returns how many members were followed.
@@ -189,7 +156,7 @@ def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
     run = candidates.run[k]
     remembers = law_remembers(run[CODE])
     grids, i, j, _ = tile
-    _, lists, spans, _ = buffers
+    _, lists, spans, _, _, _ = buffers
     step, told, count, shared, modes, sets, todo, _, _, _, _ = lists
     followed = run[MODES] == FOLLOWED
     kind = candidates.step[run[FIRST_STEP] + u, KIND] if followed else np.int64(POINT)
@@ -197,6 +164,7 @@ def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
     height, width = extent(grids, i, j)
     todo[:LOADED] = 1
     changed = False
+    done = 0.0
     level = np.int64(0)
     while level < LEVELS and not (remembers and kind == POINT):
         size = BROAD >> level
@@ -229,13 +197,57 @@ def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
                     _copy_sets(sets, at * size, size)
                 changed = changed or kind == WHOLE
         level += 1
-    done = 0.0
     for smallest in range(PARTS):
         if todo[smallest] != 0 and smallest * SHORT < width:
             done += _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, price)
             changed = changed or (remembers and kind == WHOLE)
     if changed:
         _share(modes[0], sets[0], height, shared)
+    return done
+
+
+@kernel
+def _price_sorted(model, candidates, k, u, tile, buffers, price):
+    """Go through a step by a law that does not remember: list it for the parts of which all members stay in a mode, and
+    price other parts by what their members do.
+
+    model, candidates, k, tile, buffers, price: as of `_price_next`.
+    u: the step, by its number among those of the run.
+
+    Returns how many prices of steps were computed.
+    """
+    grids, i, j, _ = tile
+    _, lists, spans, _, sorting, _ = buffers
+    step, told, count, _, _, _, todo, _, _, _, _ = lists
+    mode = sorting[3]
+    _, width = extent(grids, i, j)
+    s = candidates.run[k, FIRST_STEP] + u
+    todo[:LOADED] = 1
+    yes = np.bool_(True)
+    no = np.bool_(False)
+    done = 0.0
+    for level in range(LEVELS):
+        size = BROAD >> level
+        for at in range(1 << level):
+            smallest = at * (size // SHORT)
+            if (at + 1) * size > width or todo[smallest] == 0 or grids[3][level, j * PARTS + smallest] == 0:
+                continue
+            part = (1 << level) - 1 + at
+            todo[smallest : smallest + size // SHORT] = 0
+            modes_at_nodes(model, candidates, k, s, part, spans, mode)
+            old, new = modes_of_all(mode)
+            if old == UNSORTED or old != new:
+                done += price_part(model, candidates, k, s, level, at * size, size, yes, no, tile, buffers, price)
+            elif not law_is_idle(candidates.run[k, CODE], old):
+                step[part, count[part]] = u
+                told[part, count[part]] = old
+                count[part] += 1
+    for smallest in range(PARTS):
+        first = smallest * SHORT
+        last = min(first + SHORT, width)
+        if todo[smallest] != 0 and first < width:
+            level = np.int64(LEVELS - 1 if last - first == SHORT else NO_LEVEL)
+            done += price_part(model, candidates, k, s, level, first, last - first, no, no, tile, buffers, price)
     return done
 
 
@@ -289,22 +301,6 @@ def _share(modes, sets, height, shared):
 
 
 @kernel
-def _load_all(model, candidates, k, grids, i, j, whole):
-    """Put all members of a tile into the model, from place PLACES on.
-
-    model, candidates, k: as of `load_members`.
-    grids, i, j: the tile, as of `tile_interpolation.extent`.
-    whole (2, PLACES): scratch.
-    """
-    height, width = extent(grids, i, j)
-    for a in range(TALL):
-        for b in range(BROAD):
-            whole[0, a * BROAD + b] = i * TALL + min(a, height - 1)
-            whole[1, a * BROAD + b] = j * BROAD + min(b, width - 1)
-    load_members(model, candidates, k, whole, np.int64(PLACES), np.int64(PLACES))
-
-
-@kernel
 def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, price):
     """Follow the members of one of the smallest parts through a step.
 
@@ -317,60 +313,65 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, 
     """
     run = candidates.run[k]
     grids, i, j, _ = tile
-    _, lists, _, following = buffers
-    _, _, _, _, modes, sets, todo, _, fresh, whole, _ = lists
+    lists = buffers[1]
+    modes, sets, todo, fresh, whole = lists[4], lists[5], lists[6], lists[8], lists[9]
     height, width = extent(grids, i, j)
     if todo[LOADED] == 0:
-        _load_all(model, candidates, k, grids, i, j, whole)
+        load_all(model, candidates, k, grids, i, j, whole)
         todo[LOADED] = 1
     first = smallest * SHORT
-    last_column = min(first + SHORT, width)
-    remembers = law_remembers(run[CODE])
+    wide = min(SHORT, width - first)
     s = run[FIRST_STEP] + u
-    kind = candidates.step[s, KIND] if run[MODES] == FOLLOWED else np.int64(POINT)
-    to = np.int64(0) if kind == WHOLE else np.int64(1)
-    yes = np.bool_(True)
+    if run[MODES] == PIECES:
+        _add_by_pieces(model, candidates, k, run[FIRST_STATE] + u, first, wide, height, buffers, price)
+        return 1.0 * height * wide
+    kind = candidates.step[s, KIND]
+    if kind == POINT:
+        for a in range(height):
+            for b in range(a * BROAD + first, a * BROAD + first + wide):
+                started = begun or ends != 0
+                i = loaded_at(b)
+                price[b] += price_point(model, candidates, k, i, s, modes[ends, b], sets[ends, b], started)
+        return 1.0 * height * wide
+    no = np.bool_(False)
+    followed = price_part(model, candidates, k, s, np.int64(NO_LEVEL), first, wide, no, begun, tile, buffers, price)
     changed = False
-    wide = last_column - first
     for a in range(height):
-        at = a * BROAD + first
-        if run[MODES] == PIECES:
-            o = run[FIRST_STATE] + u
-            works = following[3][0]
-            member_works(model, PLACES + at, wide, candidates.pose[o, 0], candidates.change[o, 0], works)
-            own = model.member[MEMBER_FREE_LENGTH, PLACES + at : PLACES + at + wide]
-            t = candidates.when[o]
-            value = candidates.level[o]
-            add_in_mode(
-                run[CODE], candidates.law[k], model.curves, t, value, candidates.energy[o], own, works, np.int64(0),
-                price[at : at + wide],
-            )  # fmt: skip
-            continue
-        if kind == POINT:
-            started = begun or ends != 0
-            for b in range(at, at + wide):
-                price[b] += price_point(model, candidates, k, PLACES + b, s, modes[ends, b], sets[ends, b], started)
-            continue
-        row = slice(at, at + wide)
-        price_step(
-            model, candidates, k, PLACES + at, wide, s, modes[0, row], sets[0, row], begun, yes, following, price[row]
-        )
-        if remembers:
-            for b in range(wide):
-                modes[to, at + b] = following[4][1, b]
-                fresh[at + b] = following[5][1, b]
-                changed = changed or fresh[at + b] != sets[0, at + b]
-    followed = 1.0 * height * wide
-    if not remembers or kind == POINT:
-        return followed
-    if changed and kind == WHOLE and last_column == first + SHORT:
+        for b in range(a * BROAD + first, a * BROAD + first + wide):
+            changed = changed or fresh[b] != sets[0, b]
+    if changed and kind == WHOLE and wide == SHORT:
         for level in range(LEVELS):
             part = (1 << level) - 1 + first // (BROAD >> level)
             followed += _price_list(model, candidates, k, part, tile, buffers, price)
+    to = np.int64(0) if kind == WHOLE else np.int64(1)
     for a in range(height):
-        for b in range(first, last_column):
-            sets[to, a * BROAD + b] = fresh[a * BROAD + b]
+        for b in range(a * BROAD + first, a * BROAD + first + wide):
+            sets[to, b] = fresh[b]
     return followed
+
+
+@kernel
+def _add_by_pieces(model, candidates, k, o, first, wide, height, buffers, price):
+    """Add what the members of some columns do at a state by a law whose modes are pieces of one function.
+
+    model, candidates, k, buffers, price: as of `_price_next`.
+    o: the state.
+    first, wide: the first column, and how many there are, SHORT at most.
+    height: rows of the tile.
+    """
+    scratch, lists, _, following, _, _ = buffers
+    works = lists[10]
+    values = scratch[5]
+    count = wide * TALL
+    member_works(model, PLACES + first * TALL, count, candidates.pose[o, 0], candidates.change[o, 0], works)
+    values[:count] = 0.0
+    add_pieces(
+        candidates.run[k, CODE], candidates.law[k], model.curves, candidates.when[o], candidates.level[o],
+        candidates.energy[o], works, count, following[0], following[1], values,
+    )  # fmt: skip
+    for a in range(height):
+        for b in range(wide):
+            price[a * BROAD + first + b] += values[b * TALL + a]
 
 
 @kernel
@@ -383,7 +384,7 @@ def _price_list(model, candidates, k, part, tile, buffers, price):
     Returns how many prices of steps were computed.
     """
     grids, i, j, error = tile
-    scratch, lists, _, following = buffers
+    scratch, lists, _, following, _, _ = buffers
     _, _, count, shared, _, sets, _, found, _, _, _ = lists
     plan, _, _, _, index, values, _ = scratch
     steps = count[part]
@@ -435,10 +436,6 @@ def _price_few(model, candidates, k, part, kept, members, lists, following, valu
     """
     run = candidates.run[k]
     step, told, count, _, _, _, _, _, _, _, works = lists
-    p = candidates.law[k]
-    free = model.member[MEMBER_FREE_LENGTH]
-    own = values[:members]
-    quick = law_degree(run[CODE]) > 0
     yes = np.bool_(True)
     for n in range(count[part]):
         known = told[part, n]
@@ -458,19 +455,5 @@ def _price_few(model, candidates, k, part, kept, members, lists, following, valu
         if run[MODES] == FOLLOWED:
             o = candidates.step[s, FIRST_STAGE]
             behind = candidates.step[s, LAST_STAGE]
-        while o < behind:
-            member_works(model, np.int64(0), members, candidates.pose[o, 0], candidates.change[o, 0], works)
-            t = candidates.when[o]
-            value = candidates.level[o]
-            weight = candidates.energy[o]
-            if kept != 0.0:
-                for m in range(members):
-                    works[ELONGATION, m] -= kept
-            if quick:
-                add_polynomial(
-                    run[CODE], p, model.curves, t, value, weight, works, members, known, following[0], following[1],
-                    values,
-                )  # fmt: skip
-            else:
-                add_in_mode(run[CODE], p, model.curves, t, value, weight, free, works, known, own)
-            o += 1
+        following[5][0, 0] = kept
+        add_states(model, candidates, k, o, behind, members, known, following[5][0, :1], works, following, values)

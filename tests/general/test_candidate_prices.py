@@ -478,6 +478,16 @@ def test_a_dense_pass_in_space_by_legs_that_are_crushed_knows_all_prices():
     assert_pass_is_right(*states_of(dense(in_space(DENSE["crushed"], **ENERGY)), 0.2))
 
 
+@pytest.mark.parametrize("name", ["slack", "damped and clipped", "steered", "crushed"])
+def test_a_pass_knows_members_about_the_corners_of_a_grid_in_space(name):
+    """Columns of a tile are pieces of several lines of the grid, of which hardly two members do the same in a step."""
+    scene = dense(in_space(DENSE[name], **ENERGY), 0.05)
+    plane = {"corner": [0.4, -0.6, 0], "edges": [[0.5, 0, 0.05], [0, 0.4, 0]], "count": [5, 50]}
+    scene["points"]["q"]["grid"] = {"plane": plane}
+    candidates, states = states_of(scene, 0.2)
+    assert_pass_is_right(candidates, states)
+
+
 def test_prices_of_members_in_one_mode_do_not_lose_digits_to_members_beside_them_in_another():
     """Of members that are crushed within 0.2 mm, some begin to act beside others that are a metre longer or shorter."""
     scene = arm({"type": "crush", "stiffness": 1e7, "force": 2000.0, "free_length": 1.0}, **looked("energy", "mean"))
