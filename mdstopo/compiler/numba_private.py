@@ -64,6 +64,7 @@ from numba.core.typed_passes import AnnotateTypes, BaseNativeLowering, NativeLow
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.core.unsafe import eh
 from numba.core.untyped_passes import InlineClosureLikes
+from numba.experimental import structref
 from numba.experimental.jitclass.base import imp_dtor
 from numba.extending import lower_builtin, overload, type_callable
 from numba.np.arrayobj import fix_integer_index, load_item, store_item
@@ -1916,6 +1917,19 @@ def _probe_chosen(x: Any, k: int) -> Any:
     raise NotImplementedError
 
 
+class _ProbePair:
+    """What makes the structure of the probe."""
+
+    row: Any
+    table: Any
+
+    def __init__(self, *_fields: Any) -> None: ...
+
+
+class _ProbeStructure(types.StructRef):
+    """Its type."""
+
+
 class _Chosen:
     """What `offer` takes for a kernel."""
 
@@ -1929,6 +1943,8 @@ def _probe() -> Any:
     shared_pass = _made(_probe_pass, _OPTIMISED, frozenset({"nsz"}), False)
     offer(_probe_chosen, lambda _x, _k: chosen)
     enter_threads(_probe_shared, _probe_taken)
+    structref.register(_ProbeStructure)
+    enter_structure(_ProbePair, _ProbeStructure, ("row", "table"))
 
     def probe(tag, x, table, yes, counter, done, how):  # type: ignore[no-untyped-def]
         """What is compiled and then called to see whether machine code does what is written.
@@ -1941,14 +1957,15 @@ def _probe() -> Any:
         done (9,): what they write.
         how: 1 raises ValueError.
         """
-        row = _probe_chosen(x, 2)
+        pair = _ProbePair(_probe_chosen(x, 2), table)
+        row = pair.row
         if how == 1:
             raise ValueError("asked for")
         _probe_shared(shared_pass, 2, (counter, done))
         listed = [x[1:].copy()]
         for _ in range(tag[1]):
             listed.append(row.copy())  # noqa: PERF401  (one after another, so that it grows)
-        table.reshape(table.size)[1] = listed[-1].sum()
+        pair.table.reshape(table.size)[1] = listed[-1].sum()
         return table[0, -1], len(listed) + done.sum(), yes and row[0] < 1.0
 
     return outer(probe, frozenset())
