@@ -262,7 +262,7 @@ class Lower(NumbaLower):
         if kinds[-1] == types.slice2_type:
             start, count = self._span(places[-1], self.builder.extract_value(given, [_SHAPE, len(kinds) - 1]))
             kinds, places = (*kinds[:-1], types.intp), [*places[:-1], start]
-        address = self._address(array, given, kinds, places)
+        address = self._address(array, given, kinds, places, checked=len(places) - (count is not None))
         if len(kinds) == array.ndim and count is None:
             found = load_item(self.context, self.builder, array, address)
         else:
@@ -324,11 +324,17 @@ class Lower(NumbaLower):
             return [value]
         return [self.builder.extract_value(value, k) for k in range(len(wanted))]
 
-    def _address(self, array: Any, given: Any, kinds: Any, index: Any) -> Any:
-        """Where the item is, or the first one of the view; the arithmetic is Numba's own."""
+    def _address(self, array: Any, given: Any, kinds: Any, index: Any, checked: int | None = None) -> Any:
+        """Where the item is, or the first one of the view; the arithmetic is Numba's own.
+
+        checked: of how many of the places NUMBA_BOUNDSCHECK asks; None: of all. The start of a slice may be its end.
+        """
         build = self.builder
         shape = [build.extract_value(given, [_SHAPE, k]) for k in range(array.ndim)]
         places = [self._place(*each) for each in zip(kinds, index, shape, strict=False)]
+        if self.context.enable_boundscheck:
+            for place, length in list(zip(places, shape, strict=False))[:checked]:
+                cgutils.do_boundscheck(self.context, build, place, length)
         data = build.extract_value(given, _DATA)
         return cgutils.get_item_pointer2(self.context, build, data, shape, (), "C", places)
 
@@ -336,14 +342,11 @@ class Lower(NumbaLower):
         """A place along one dimension. One that is written as a number may count from the end, a computed one may not.
 
         Code that asks of every place whether it counts from the end keeps loops from reading and writing vectors.
-        With NUMBA_BOUNDSCHECK=1 a place outside of the array raises IndexError.
         """
         if isinstance(index, llvm_ir.Constant):
             place = fix_integer_index(self.context, self.builder, kind, index, length)
         else:
             place = self.context.cast(self.builder, index, kind, types.intp)
-        if self.context.enable_boundscheck:
-            cgutils.do_boundscheck(self.context, self.builder, place, length)
         return place
 
     def _view(self, kind: Any, given: Any, address: Any, count: Any = None) -> Any:
