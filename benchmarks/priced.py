@@ -362,9 +362,9 @@ def nested(torso: int, side: int) -> None:
     seconds = time.perf_counter() - began
     evaluator = Evaluator(found.case)
     problem = evaluator.problem()
-    price(found.case, evaluator, problem, found.alpha)
+    price(found.case, problem, found.alpha)
     began, spent = time.perf_counter(), time.process_time()
-    price(found.case, evaluator, problem, found.alpha)
+    price(found.case, problem, found.alpha)
     passed = time.perf_counter() - began
     assert found.pricing is not None
     told = {

@@ -7,14 +7,14 @@ of several peaks (a maximum that is minimised, a minimum that is maximised) ever
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from mdstopo.case.design_space import DesignSpace
 from mdstopo.case.errors import CaseError
 from mdstopo.case.exchange import Side, exchange_ends
-from mdstopo.case.model import Case, Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow, VolumeRow
 from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.responses import kind_of
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
@@ -24,6 +24,9 @@ from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.scene.moving_volumes import moving_volumes
 from mdstopo.scene.refusals import refusals
 from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.sensitivity.candidate_pass import CandidatePass
 
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
@@ -46,6 +49,7 @@ class DesignEvaluator(Protocol):
     ) -> Evaluation: ...
     def with_objectives(self, objectives: Sequence[str]) -> "DesignEvaluator": ...
     def pricing_states(self, weights: Mapping[str, Sequence[float]]) -> Any: ...
+    def candidates_of(self, group: MemberGroup, count: int | None = None) -> "CandidatePass[Any]": ...
 
 
 class DesignProblem:
@@ -137,6 +141,11 @@ class DesignProblem:
         ends = np.cumsum(list(places.values()))
         parts = zip(places, np.split(weights, ends[:-1]), strict=True)
         return self._evaluator.pricing_states({name: part.tolist() for name, part in parts})
+
+    def candidates_of(self, group: MemberGroup, count: int | None = None) -> "CandidatePass[Any]":
+        """The candidates of a priced group, by the kernels that the pricing states are of; see
+        `Evaluator.candidates_of`."""
+        return self._evaluator.candidates_of(group, count)
 
     def sample_of(self, evaluation: Evaluation, gradient: bool = True, x: Floats | None = None) -> Sample:
         """The rows of U of an evaluation; x: of the design, where sums of lengths vary with it."""

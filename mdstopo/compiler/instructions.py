@@ -206,6 +206,21 @@ class Builder(ir.IRBuilder):  # type: ignore[misc]  # llvmlite is not typed
         self._share(ptr, val)
         return super().atomic_rmw(op, ptr, val, ordering, name)
 
+    def cmpxchg(self, ptr: Any, cmp: Any, val: Any, *rest: Any, **named: Any) -> Any:
+        """Exchange what others may change as well."""
+        self._share(ptr, cmp, val)
+        return super().cmpxchg(ptr, cmp, val, *rest, **named)
+
+    def store_atomic(self, value: Any, ptr: Any, *rest: Any, **named: Any) -> Any:
+        """Store what others may read and change as well."""
+        self._share(value, ptr)
+        return super().store_atomic(value, ptr, *rest, **named)
+
+    def invoke(self, fn: Any, args: Any, *rest: Any, **named: Any) -> Any:
+        """Call a function that may raise."""
+        self._share(*args)
+        return super().invoke(fn, args, *rest, **named)
+
     def phi(self, typ: Any, name: str = "", flags: Iterable[str] = ()) -> Any:
         """A value by the block that one comes from; of addresses it may be any, and no place is followed any more."""
         if isinstance(typ, ir.PointerType):
@@ -305,22 +320,24 @@ def _reach(function: Any) -> None:
         if known is not None:
             block.instructions[-1] = block.terminator = ir.Branch(block, "br", [last.operands[1 if known else 2]])
     first = function.blocks[0]
-    met, waiting = {id(first)}, [first]
+    met, waiting, edges = {id(first)}, [first], set()
     while waiting:
-        last = waiting.pop().terminator
+        block = waiting.pop()
+        last = block.terminator
         if last is None:
             continue
         for each in [*last.operands, *getattr(last, "destinations", ()), *_cases(last)]:
-            if isinstance(each, ir.Block) and id(each) not in met:
+            if not isinstance(each, ir.Block):
+                continue
+            edges.add((id(block), id(each)))
+            if id(each) not in met:
                 met.add(id(each))
                 waiting.append(each)
-    if len(met) == len(function.blocks):
-        return
     function.blocks = [block for block in function.blocks if id(block) in met]
     for block in function.blocks:
         for each in block.instructions:
-            if isinstance(each, ir.PhiInstr):
-                each.incomings = [way for way in each.incomings if id(way[1]) in met]
+            if isinstance(each, ir.PhiInstr):  # a branch whose way is known leads no more to where it might have
+                each.incomings = [way for way in each.incomings if (id(way[1]), id(block)) in edges]
 
 
 def _cases(last: Any) -> list[Any]:

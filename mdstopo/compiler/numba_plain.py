@@ -9,6 +9,7 @@ from typing import Any
 
 import numba
 from numba import types
+from numba.experimental import structref
 from numba.extending import overload
 
 from mdstopo.compiler import threads
@@ -92,6 +93,4 @@ def enter_threads() -> None:
 
 def enter_structure(maker: type, kind: type, fields: tuple[str, ...]) -> None:
     """Have `maker(...)` make a structure of a kind."""
-    from numba.experimental import structref
-
     structref.define_constructor(maker, kind, list(fields))

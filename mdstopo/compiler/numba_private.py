@@ -101,8 +101,6 @@ _ERRORS: Any = errors
 
 #: what a step of a loop over `range` gives: a number, and whether there is one
 _COUNTED = types.Pair(types.int64, types.boolean)
-#: how far into a structure its fields are, by its type and the field
-_OFFSETS: dict[tuple[Any, int], int] = {}
 
 #: places of an array's fields in Numba's structure of it
 _HOLDER, _PARENT, _COUNT, _SIZE, _DATA, _SHAPE, _STRIDES = range(7)
@@ -209,9 +207,9 @@ class Lower(NumbaLower):
         start, stop, step = (build.extract_value(given, k) for k in range(3))
         if not isinstance(step, llvm_ir.Constant) or step.constant not in (1, -1):
             return None
-        least = build.sub(stop, start) if step.constant == 1 else build.sub(start, stop)
+        distance = build.sub(stop, start) if step.constant == 1 else build.sub(start, stop)
         zero = start.type(0)
-        count = build.select(build.icmp_signed(">", least, zero), least, zero)
+        count = build.select(build.icmp_signed(">", distance, zero), distance, zero)
         place, left = (cgutils.alloca_once_value(build, value) for value in (start, count))
         return cgutils.pack_struct(build, (place, stop, step, left))
 
@@ -264,7 +262,7 @@ class Lower(NumbaLower):
         if kinds[-1] == types.slice2_type:
             start, count = self._span(places[-1], self.builder.extract_value(given, [_SHAPE, len(kinds) - 1]))
             kinds, places = (*kinds[:-1], types.intp), [*places[:-1], start]
-        address = self._address(array, given, kinds, places)
+        address = self._address(array, given, kinds, places, checked=len(places) - (count is not None))
         if len(kinds) == array.ndim and count is None:
             found = load_item(self.context, self.builder, array, address)
         else:
@@ -313,8 +311,8 @@ class Lower(NumbaLower):
             if isinstance(end, llvm_ir.Constant) and end.constant == types.intp.maxval:
                 ends.append(length)
                 continue
-            for limit, other in ((zero, build.add(end, length)), (zero, zero)):
-                end = build.select(build.icmp_signed("<", end, limit), other, end)
+            for other in (build.add(end, length), zero):
+                end = build.select(build.icmp_signed("<", end, zero), other, end)
             ends.append(build.select(build.icmp_signed("<", end, length), end, length))
         count = build.sub(ends[1], ends[0])
         return ends[0], build.select(build.icmp_signed(">", count, zero), count, zero)
@@ -326,11 +324,17 @@ class Lower(NumbaLower):
             return [value]
         return [self.builder.extract_value(value, k) for k in range(len(wanted))]
 
-    def _address(self, array: Any, given: Any, kinds: Any, index: Any) -> Any:
-        """Where the item is, or the first one of the view; the arithmetic is Numba's own."""
+    def _address(self, array: Any, given: Any, kinds: Any, index: Any, checked: int | None = None) -> Any:
+        """Where the item is, or the first one of the view; the arithmetic is Numba's own.
+
+        checked: of how many of the places NUMBA_BOUNDSCHECK asks; None: of all. The start of a slice may be its end.
+        """
         build = self.builder
         shape = [build.extract_value(given, [_SHAPE, k]) for k in range(array.ndim)]
         places = [self._place(*each) for each in zip(kinds, index, shape, strict=False)]
+        if self.context.enable_boundscheck:
+            for place, length in list(zip(places, shape, strict=False))[:checked]:
+                cgutils.do_boundscheck(self.context, build, place, length)
         data = build.extract_value(given, _DATA)
         return cgutils.get_item_pointer2(self.context, build, data, shape, (), "C", places)
 
@@ -338,14 +342,11 @@ class Lower(NumbaLower):
         """A place along one dimension. One that is written as a number may count from the end, a computed one may not.
 
         Code that asks of every place whether it counts from the end keeps loops from reading and writing vectors.
-        With NUMBA_BOUNDSCHECK=1 a place outside of the array raises IndexError.
         """
         if isinstance(index, llvm_ir.Constant):
             place = fix_integer_index(self.context, self.builder, kind, index, length)
         else:
             place = self.context.cast(self.builder, index, kind, types.intp)
-        if self.context.enable_boundscheck:
-            cgutils.do_boundscheck(self.context, self.builder, place, length)
         return place
 
     def _view(self, kind: Any, given: Any, address: Any, count: Any = None) -> Any:
@@ -935,11 +936,20 @@ def enter_structure(maker: type, kind: type, fields: tuple[str, ...]) -> None:
 def _field_of(context: Any, build: Any, kind: Any, data: Any, k: int) -> Any:
     """Where a field of a structure is: an address that names the whole structure's type would be long to write and to
     read."""
-    whole = context.data_model_manager[kind.get_data_type()].get_value_type()
-    if (kind, k) not in _OFFSETS:
-        _OFFSETS[kind, k] = whole.get_element_offset(context.target_data, k)
-    address = build.gep(data, [llvm_ir.Constant(_WORD, _OFFSETS[kind, k])], inbounds=True)
+    whole, offset = _offset(context, kind, k)
+    address = build.gep(data, [llvm_ir.Constant(_WORD, offset)], inbounds=True)
     return build.bitcast(address, whole.elements[k].as_pointer())
+
+
+@functools.cache
+def _offset(context: Any, kind: Any, k: int) -> tuple[Any, int]:
+    """LLVM's type of a structure, and how far into it a field is."""
+    whole = context.data_model_manager[kind.get_data_type()].get_value_type()
+    target = context.target_data
+    if hasattr(whole, "get_element_offset"):
+        return whole, whole.get_element_offset(target, k)
+    pointer = whole._get_ll_pointer_type(target)  # llvmlite 0.43
+    return whole, target.get_element_offset(pointer.element_type, k)
 
 
 # Threads
@@ -1068,7 +1078,11 @@ class _Calls(callconv.CPUCallConv):
     def call_function(
         self, builder: Any, callee: Any, resty: Any, argtys: Any, args: Any, attrs: Any = None
     ) -> tuple[Any, Any]:
-        """Call a function of ours: where it puts what it raises is where its caller puts it."""
+        """Call a function of ours: where it puts what it raises is where its caller puts it.
+
+        builder: of the caller. callee, resty, argtys: the function, its result's type and its arguments' types. args:
+        the values. attrs: of the call, for LLVM.
+        """
         if not isinstance(builder, Builder):
             return super().call_function(builder, callee, resty, argtys, args, attrs)  # type: ignore[no-any-return]
         result = cgutils.alloca_once(builder, self.get_return_type(resty).pointee)

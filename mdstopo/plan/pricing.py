@@ -14,12 +14,10 @@ from mdstopo.optimizer.competing_rows import FeasibleSet, multipliers
 from mdstopo.optimizer.problem import Problem, Sample
 from mdstopo.optimizer.wide import ranges
 from mdstopo.plan.priced_designs import in_case, packed
-from mdstopo.starts.evaluator_interface import Engine
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.design_problem import DesignProblem
-    from mdstopo.engine import Evaluator
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -72,14 +70,13 @@ class Pricing:
     together: float
 
 
-def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None = None) -> Prices | None:
+def price(case: Case, of: Problem, x: Floats, count: int | None = None) -> Prices | None:
     """The prices of candidates of a case at a design, the optimiser's x (n,); None where it cannot be evaluated.
 
-    engine, of: the case's evaluator, and what the optimiser sees of it.
+    of: what the optimiser sees of it.
     count: of about so many candidates of each group, evenly spread; None: of all.
     """
     problem = cast("DesignProblem", of)
-    evaluator = cast("Evaluator", engine)
     evaluation = problem.evaluation(x)
     if evaluation.status is not Status.OK:
         return None
@@ -95,7 +92,7 @@ def price(case: Case, engine: Engine, of: Problem, x: Floats, count: int | None 
     left: dict[str, float] = {}
     for groups in mirrored_groups(case):
         worth = sum(_worth(case, group, linear) for group in groups)
-        found = evaluator.candidates_of(groups[0], count).go_through(states, worth, MOST)
+        found = problem.candidates_of(groups[0], count).go_through(states, worth, MOST)
         seen += len(groups) * found.seen + (sum(map(len, groups)) if count is None else 0)
         best = max(best, found.best / scale)
         material = _material(case, groups)

@@ -13,7 +13,6 @@ from mdstopo.case.words import count_text
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.state import State
 from mdstopo.plan.pricing import Prices, Pricing, confirmed, price
-from mdstopo.starts.evaluator_interface import Engine
 from mdstopo.status import RunStatus
 from mdstopo.store.contents import CANDIDATES, Datasets
 from mdstopo.store.result_reader import ResultView
@@ -72,11 +71,11 @@ class Rounds:
         best, together = self.rows[-1][4:6] if self.rows else (np.nan, np.nan)
         return Pricing(self.candidates, self.count, best, together)
 
-    def go_on(self, engine: Engine, problem: Problem, state: State) -> bool:
+    def go_on(self, problem: Problem, state: State) -> bool:
         """Price all candidates at the end of a round. Returns whether another round follows, with the candidates
         that enter.
 
-        engine, problem, state: of the case so far, of what was optimised, and where that has ended.
+        problem, state: what was optimised, and where that has ended.
         """
         before = self.rows[-1][3] if self.rows else np.inf
         tolerance = self.case.optimizer.tolerance
@@ -85,7 +84,7 @@ class Rounds:
         little = LITTLE * tolerance
         while True:
             count = self._count_of(level)
-            found = self.last = price(self.case, engine, problem, state.best_alpha, count)
+            found = self.last = price(self.case, problem, state.best_alpha, count)
             if found is None:
                 self._ended = True
                 return False

@@ -215,7 +215,7 @@ def _priced(
     problem = engine.problem(task.scalarisation)
     state = _gone(built, problem, replace(task, start=alpha), stop, keep)
     evaluations = int(state.evaluations)
-    while rounds.go_on(engine, problem, state):
+    while rounds.go_on(problem, state):
         engine = make_engine(rounds.case)
         problem = engine.problem(task.scalarisation)
         state = _gone(rounds.case, problem, replace(task, start=rounds.design, begun=None), stop, None)

@@ -178,7 +178,7 @@ def _compile_all(case: Case) -> None:
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(case.space.expand(begin), gradient=True)
     if case.priced_groups:
-        price(case, engine, problem_of(engine, even(case)), begin, FEW_CANDIDATES)
+        price(case, problem_of(engine, even(case)), begin, FEW_CANDIDATES)
     with contextlib.suppress(OSError):  # a full disk
         _marker(case).touch()
 

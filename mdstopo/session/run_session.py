@@ -222,7 +222,7 @@ class _Run:
             problem = problem_of(engine, scalarisation)
         with self.saved_without_worker(path):
             self.iterate(make, self.marked(problem), path, workers, scalarisation)
-            while self.case.priced_groups and self.has_ended and self.price(engine, problem):
+            while self.case.priced_groups and self.has_ended and self.price(problem):
                 engine = make(self.case)
                 problem = problem_of(engine, scalarisation)
                 self.open_round(self.marked(problem))
@@ -266,7 +266,7 @@ class _Run:
         """The problem, which says which round of pricing it is of, if it is of one."""
         return Marked(problem, ROUND, self.rounds.count) if self.case.priced_groups else problem
 
-    def price(self, engine: Engine, problem: Problem) -> bool:
+    def price(self, problem: Problem) -> bool:
         """Price all candidates at the optimum of the members; whether some of them enter, which then are built."""
         best = best_of(self.case, self.states)
         state = None if best is None else self.states[best]
@@ -274,7 +274,7 @@ class _Run:
             self.has_ended = False
             return False
         self.notify(f"round {self.rounds.count + 1}: pricing {count_text(self.rounds.candidates)} candidates")
-        goes_on = self.rounds.go_on(engine, problem, state)
+        goes_on = self.rounds.go_on(problem, state)
         self.case = self.rounds.case
         return goes_on
 

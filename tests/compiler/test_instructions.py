@@ -69,20 +69,54 @@ def test_a_later_store_counts_also_in_a_part() -> None:
     assert result(written(fill), 7, 3) == 3
 
 
-@pytest.mark.parametrize("by_cast", [False, True])
-def test_a_place_that_others_know_of_is_read_again(by_cast: bool) -> None:
+def by_call(build: Builder, function: Any, place: Any) -> None:
+    other = ir.Function(function.module, ir.FunctionType(ir.VoidType(), [WORD.as_pointer()]), "other")
+    inside = ir.IRBuilder(other.append_basic_block())
+    inside.store(WORD(5), other.args[0])
+    inside.ret_void()
+    build.call(other, [place])
+
+
+def by_cast(build: Builder, _function: Any, place: Any) -> None:
+    build.store(WORD(5), build.inttoptr(build.ptrtoint(place, WORD), WORD.as_pointer()))
+
+
+def by_choice(build: Builder, function: Any, place: Any) -> None:
+    other = build.alloca(WORD)
+    build.store(WORD(5), build.select(build.icmp_signed(">", function.args[1], WORD(0)), place, other))
+
+
+def by_way(build: Builder, function: Any, place: Any) -> None:
+    other, before = build.alloca(WORD), build.block
+    with build.if_then(build.icmp_signed(">", function.args[1], WORD(0))):
+        inside = build.block
+    pointer = build.phi(WORD.as_pointer())
+    pointer.add_incoming(other, before)
+    pointer.add_incoming(place, inside)
+    build.store(function.args[0], place)
+    build.store(WORD(5), pointer)
+
+
+def by_atomic_change(build: Builder, _function: Any, place: Any) -> None:
+    build.atomic_rmw("xchg", place, WORD(5), "seq_cst")
+
+
+def by_exchange(build: Builder, function: Any, place: Any) -> None:
+    build.cmpxchg(place, function.args[0], WORD(5), "seq_cst")
+
+
+def by_atomic_store(build: Builder, _function: Any, place: Any) -> None:
+    build.store_atomic(WORD(5), place, "seq_cst", 8)
+
+
+@pytest.mark.parametrize(
+    "change", [by_call, by_cast, by_choice, by_way, by_atomic_change, by_exchange, by_atomic_store]
+)
+def test_a_place_that_others_know_of_is_read_again(change: Callable[[Builder, Any, Any], None]) -> None:
     def fill(build: Builder, function: Any) -> None:
-        module = function.module
-        other = ir.Function(module, ir.FunctionType(ir.VoidType(), [WORD.as_pointer()]), "other")
-        inside = ir.IRBuilder(other.append_basic_block())
-        inside.store(WORD(5), other.args[0])
-        inside.ret_void()
         place = build.alloca(WORD)
         build.store(function.args[0], place)
-        if by_cast:
-            build.store(WORD(5), build.inttoptr(build.ptrtoint(place, WORD), WORD.as_pointer()))
-        else:
-            build.call(other, [place])
+        change(build, function, place)
         build.ret(build.load(place))
 
     assert result(written(fill), 7, 3) == 5
@@ -120,6 +154,21 @@ def test_blocks_that_nothing_leads_to_are_left_out() -> None:
     function = written(fill)
     assert names(function).count("mul") == 1
     assert result(function, 7, 3) == 49
+
+
+@pytest.mark.parametrize("goes", [False, True])
+def test_a_value_by_the_way_knows_only_ways_that_are_left(goes: bool) -> None:
+    def fill(build: Builder, function: Any) -> None:
+        before = build.block
+        with build.if_then(build.icmp_signed("<", WORD(1), WORD(2) if goes else WORD(0))):
+            one = build.mul(function.args[0], function.args[1])
+            inside = build.block
+        found = build.phi(WORD)
+        found.add_incoming(function.args[0], before)
+        found.add_incoming(one, inside)
+        build.ret(found)
+
+    assert result(written(fill), 7, 3) == (21 if goes else 7)
 
 
 def test_constants_are_computed_as_the_processor_does() -> None:

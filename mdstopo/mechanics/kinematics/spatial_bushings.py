@@ -108,6 +108,8 @@ def add_bushings(model, rel, q, tangent, sums):
                 dm = plus(dm, vector_rate(theta, _along_axes(home, b, STIFFNESS + 3, change)))
             add_column(k, 0, m, df)
             add_column(k, 3, m, dm)
+            if o.shape[0] == C:
+                continue  # sums have no room for C where nothing is damped
             damped = cross(arm, by_rate)
             if m >= 3:
                 damped = plus(damped, _along_axes(home, b, DAMPING + 3, axis))
