@@ -3,7 +3,7 @@
 What prices follow from is found first (`pricing_states`). The members of a group lie between the points of two grids;
 here all of them are gone through, tile by tile, of which a few numbers are kept (as in
 `sensitivity.springs_candidate_prices`), or single ones. Members of laws that switch are followed through the steps
-(`switching_prices`), in tiles as few of them as can be (`tile_sweep`).
+(`switching_prices`), in tiles as few of them as can be (`tile_prices`).
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ from mdstopo.general.priced_candidates import (
     unpack_candidates,
 )
 from mdstopo.general.switching_prices import ROW, make_following, price_followed
-from mdstopo.general.tile_sweep import make_lists, price_run
+from mdstopo.general.tile_prices import make_lists, price_run
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     has_spring_energies,
     member_designs,
@@ -162,7 +162,7 @@ def _price_by_modes(model, candidates, grids, i, j, error, scratch, lists, price
     """The prices of a tile where laws have modes: those of each of these laws, and of all others.
 
     model, candidates, grids, i, j, error, scratch, price: as of `_price_tile`.
-    lists: of `tile_sweep.make_lists`.
+    lists: of `tile_prices.make_lists`.
 
     Returns how many prices were computed, of a law as parts of one.
     """

@@ -53,8 +53,8 @@ from mdstopo.sensitivity.tile_interpolation import BROAD, LEVELS, TALL
 BOUND_LEVELS = LEVELS + 2
 NARROW = BROAD >> (BOUND_LEVELS - 1)
 #: parts of a tile of all levels, of which those of a level begin at 2^level - 1; the place of its rows behind them
-PARTS_OF_ALL = 2**BOUND_LEVELS - 1
-ROWS_OF_ALL = PARTS_OF_ALL
+BOUND_PARTS = 2**BOUND_LEVELS - 1
+ROWS_OF_ALL = BOUND_PARTS
 #: points in body frames, and where their case has them; the middle of their line, and half of it
 LOCAL, STATED = range(2)
 MIDDLE, HALF = range(2)
@@ -76,8 +76,8 @@ LEAVES = -2
 def make_spans(axes):
     """Lines (parts and rows, LOCAL or STATED, MIDDLE or HALF, axes), numbers of parts, vectors, bounds: scratch."""
     return (
-        np.zeros((PARTS_OF_ALL + 1, 2, 2, axes)),
-        np.zeros((PARTS_OF_ALL, PART_NUMBERS)),
+        np.zeros((BOUND_PARTS + 1, 2, 2, axes)),
+        np.zeros((BOUND_PARTS, PART_NUMBERS)),
         np.zeros((4, axes)),
         np.zeros(4),
     )

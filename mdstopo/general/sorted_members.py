@@ -29,15 +29,22 @@ from mdstopo.mechanics.laws.law_table import (
 )
 from mdstopo.sensitivity.tile_interpolation import BROAD, PLACES, SHORT, TALL
 
-#: classes of members of a part in a step, at most; of each the mode in which they begin, the one in which they end, and
-#: how many there are
+#: classes of members of a part in a step, at most
 CLASSES = 6
-FROM, TO, COUNT = range(3)
+#: of each class: the mode in which its members begin, the one in which they end, and how many there are
+CLASS_NUMBERS = 3
+FROM, TO, COUNT = range(CLASS_NUMBERS)
 #: the class of members that are in none
 UNSORTED = -1
-#: members that are sorted at once; modes in which they may stay, and corners of what they do
+#: members that are sorted at once
 MANY = SHORT * TALL
-STAYS, CORNERS = 4, 4
+#: modes in which members may stay that are tried, at most
+TRIED = 4
+#: corners of the range of elongations and rates of all members
+CORNERS = 4
+#: of a tangent of a margin, a linear function: its value where elongation and rate are zero, and its slopes by these
+TANGENT_NUMBERS = 3
+AT_ZERO, BY_ELONGATION, BY_RATE = range(TANGENT_NUMBERS)
 #: vectors of members are sorted where margins are above this: rounding does not decide (m, m/s or a part)
 SURE = 1e-11
 
@@ -49,22 +56,27 @@ def make_sorting():
     members may stay, and the tangents of their margins."""
     return (
         np.zeros(PLACES, np.int64),
-        np.zeros((CLASSES, 3), np.int64),
+        np.zeros((CLASSES, CLASS_NUMBERS), np.int64),
         np.zeros(PLACES, np.int64),
         np.zeros(NODES, np.int64),
         np.zeros((NODES, WORKS, MANY)),
         np.zeros(BROAD // NARROW, np.int64),
-        np.zeros(STAYS, np.int64),
-        np.zeros((STAYS, CORNERS, 3)),
+        np.zeros(TRIED, np.int64),
+        np.zeros((TRIED, CORNERS, TANGENT_NUMBERS)),
     )
 
 
 @part
-def class_of(old, new, count, classes):
-    """The class of members that begin in one mode and end in another; UNSORTED where there are too many classes.
+def join_class(old, new, count, classes):
+    """Add members to the class of those that begin in one mode and end in another, which is made if there is none.
 
-    count: how many members there are.
-    classes (CLASSES, 3): of those that there are, to which it is added.
+    In:
+      old, new: the modes.
+      count: how many members are added, 1 or more.
+    In place:
+      classes (CLASSES, CLASS_NUMBERS): of those that there are.
+
+    Returns the number of the class; UNSORTED where there are too many classes.
     """
     for c in range(CLASSES):
         if classes[c, COUNT] == 0:
@@ -78,16 +90,16 @@ def class_of(old, new, count, classes):
 
 @part
 def modes_of_all(mode):
-    """The mode in which all members of a part begin a step, and the one in which they end it; UNSORTED where they
-    differ, and where there are more.
+    """The mode in which all members of a part begin a step, and the one in which they end it; UNSURE where members
+    differ, and where there are more modes.
 
     mode (NODES,): of `certain_modes.modes_at_nodes`.
     """
-    unsorted = np.int64(UNSORTED)
+    unsure = np.int64(UNSURE)
     now = mode[0]
     for m in range(NODES):
         if mode[m] == UNSURE or (mode[m] != now and now != mode[0]):
-            return unsorted, unsorted
+            return unsure, unsure
         now = mode[m]
     return mode[0], now
 
@@ -107,7 +119,7 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
       sorting: of `make_sorting`: with the modes of all members at nodes, UNSURE where the members are to be looked at,
         who are overwritten there; classes of the members are set, and added to those that there are.
     """
-    kind, classes, _, mode, works, _, stay, _ = sorting
+    kind, classes, _, mode, works, _, tried, _ = sorting
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     lo = PLACES + first * TALL
@@ -119,32 +131,28 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
             if law_remembers(code):
                 for i in range(size * TALL):
                     works[m, ELONGATION, i] -= kept[_place(first, i)]
-    stays = np.int64(0)
+    count = np.int64(0)
     if is_quick(code, p, model.curves) and (known or not law_remembers(code)):
-        stays = _fill_stays(code, p, model.curves, candidates.step_time[s, 0], first, size, known, begin, sorting)
+        count = _fill_tried(code, p, model.curves, candidates.step_time[s, 0], first, size, known, begin, sorting)
     for i in range(0, size * TALL, lanes()):
         # a bit for each lane
         left = (1 << max(min(height - i % TALL, lanes()), 0)) - 1
-        for n in range(stays):
-            bits = _staying(n, i, sorting) & left
-            own = np.int64(UNSORTED)
+        for n in range(count):
+            bits = _stay_in(n, i, sorting) & left
             for lane in range(lanes() if bits != 0 else 0):
                 at = _place(first, i + lane)
-                if (bits >> lane) & 1 == 1 and (not known or begin[at] == stay[n]):
-                    if own == UNSORTED:
-                        own = class_of(stay[n], stay[n], 0, classes)
-                    if own != UNSORTED:
-                        classes[own, COUNT] += 1
+                if (bits >> lane) & 1 == 1 and (not known or begin[at] == tried[n]):
+                    own = join_class(tried[n], tried[n], 1, classes)
                     kind[at] = own
                     left &= ~(1 << lane)
         for lane in range(lanes() if left != 0 else 0):
             if (left >> lane) & 1 == 1:
                 at = _place(first, i + lane)
-                old = begin[at] if known else np.int64(UNSORTED)
+                old = begin[at] if known else np.int64(UNSURE)
                 old, new = _modes_of(
                     code, p, model.curves, free[lo + i + lane], candidates.step_time[s], old, mode, works, i + lane
                 )  # fmt: skip
-                kind[at] = class_of(old, new, 1, classes) if old != UNSORTED else UNSORTED
+                kind[at] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
 
 
 @part
@@ -154,18 +162,19 @@ def _place(first, i):
 
 
 @part
-def _fill_stays(code, p, curves, t, first, size, known, begin, sorting):
-    """Modes in which some members may stay, and the tangents of their margins at the corners of what all members do.
+def _fill_tried(code, p, curves, t, first, size, known, begin, sorting):
+    """Modes in which some members may stay, and tangents of their margins at the corners of the range of elongations
+    and rates of all members.
 
-    Of laws that are polynomials a margin is the less of two linear functions at most, and the least of these tangents.
+    Within the range a margin is the least of its tangents at the corners, being the lesser of two linear functions.
 
-    code, p (8,), curves, t: the law, numbers of all laws, and the time, of which it does not depend (s).
+    code, p (8,), curves, t: the law, numbers of all laws, and any time (s), on which the law does not depend.
     first, size, known, begin: as of `sort_members`.
     sorting: of `make_sorting`, with what the members do; the modes and the tangents are set.
 
-    Returns how many modes there are.
+    Returns how many modes there are; 0 where bounds tell the modes at all nodes, so that no range is known.
     """
-    _, _, _, mode, works, _, stay, tangent = sorting
+    _, _, _, mode, works, _, tried, tangent = sorting
     box = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for m in range(NODES):
         if mode[m] == UNSURE:
@@ -174,64 +183,69 @@ def _fill_stays(code, p, curves, t, first, size, known, begin, sorting):
                 box[2 * row] = min(box[2 * row], low)
                 box[2 * row + 1] = max(box[2 * row + 1], high)
     count = np.int64(0)
+    if box[0] > box[1]:
+        return count
     for i in range(size * TALL if known else CORNERS):
         if known:
             now = begin[_place(first, i)]
         else:
             now = np.int64(law_start(code, p, box[i // 2], box[2 + i % 2], 0.0, t, curves, 1.0))
-        new = count < STAYS
+        new = count < TRIED
         for n in range(count):
-            new = new and stay[n] != now
+            new = new and tried[n] != now
         if new:
-            stay[count] = now
+            tried[count] = now
             count += 1
     for n in range(count):
         for corner in range(CORNERS):
             x = box[corner // 2]
             rate = box[2 + corner % 2]
-            by_x, by_rate = law_margin_slopes(code, p, x, rate, stay[n], t, curves, 1.0)
-            tangent[n, corner, 0] = law_margin(code, p, x, rate, stay[n], t, curves, 1.0) - by_x * x - by_rate * rate
-            tangent[n, corner, 1] = by_x
-            tangent[n, corner, 2] = by_rate
+            by_x, by_rate = law_margin_slopes(code, p, x, rate, tried[n], t, curves, 1.0)
+            tangent[n, corner, AT_ZERO] = (
+                law_margin(code, p, x, rate, tried[n], t, curves, 1.0) - by_x * x - by_rate * rate
+            )
+            tangent[n, corner, BY_ELONGATION] = by_x
+            tangent[n, corner, BY_RATE] = by_rate
     return count
 
 
 @part
-def _staying(n, i, sorting):
+def _stay_in(n, i, sorting):
     """A bit for each member of a vector of them that stays in a mode.
 
     n, i: the number of the mode among those that were filled, and of the first member.
     sorting: of `make_sorting`.
     """
-    _, _, _, mode, works, _, stay, tangent = sorting
+    _, _, _, mode, works, _, tried, tangent = sorting
     own = tangent[n]
     bits = (1 << lanes()) - 1
     for m in range(NODES):
         if mode[m] != UNSURE:
-            bits = bits if mode[m] == stay[n] else 0
+            bits = bits if mode[m] == tried[n] else 0
             continue
         x = load(works[m, ELONGATION], i)
         rate = load(works[m, RATE], i)
         over = zero() - np.inf
         for corner in range(CORNERS):
-            over = larger(over, zero() - (own[corner, 1] * x + own[corner, 2] * rate + own[corner, 0]))
+            value = own[corner, BY_ELONGATION] * x + own[corner, BY_RATE] * rate + own[corner, AT_ZERO]
+            over = larger(over, zero() - value)
         bits &= ~negative(zero() - over - (CLOSE if m == 0 else SURE))
     return bits
 
 
 @part
 def _modes_of(code, p, curves, rest, time, old, mode, works, i):
-    """The mode in which a member begins a step, and the one in which it ends it; UNSORTED where there are more, or
+    """The mode in which a member begins a step, and the one in which it ends it; UNSURE where there are more, or
     where values at nodes do not tell.
 
     code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
     time (2,): start and length of the step (s).
-    old: the mode with which it begins, or UNSORTED where it is to be found.
+    old: the mode with which it begins, or UNSURE where it is to be found.
     mode (NODES,): of all members at the nodes, or UNSURE.
     works (NODES, WORKS, MANY), i: what members do at the nodes where that is so, less their sets, and which one it is.
     """
-    unsorted = np.int64(UNSORTED)
-    if old == UNSORTED:
+    unsure = np.int64(UNSURE)
+    if old == UNSURE:
         old = mode[0]
     if old == UNSURE:
         x = works[0, ELONGATION, i]
@@ -239,7 +253,7 @@ def _modes_of(code, p, curves, rest, time, old, mode, works, i):
         old = np.int64(law_start(code, p, x, rate, 0.0, time[0], curves, rest))
         is_clear = law_margin(code, p, x, rate, old, time[0], curves, rest) > CLOSE
         if not is_clear or law_first_set(code, p, x, old) != 0.0:
-            return unsorted, unsorted
+            return unsure, unsure
     now = old
     for m in range(1, NODES):
         if mode[m] == now:
@@ -258,8 +272,8 @@ def _modes_of(code, p, curves, rest, time, old, mode, works, i):
             if law_makes_set(code, now, new) and now == old:
                 return old, new  # `switching_together` looks at what is behind
             if new == now or not law_margin(code, p, x, rate, new, t, curves, rest) >= 0.0:
-                return unsorted, unsorted
+                return unsure, unsure
         if now != old:
-            return unsorted, unsorted
+            return unsure, unsure
         now = new
     return old, now

@@ -3,6 +3,9 @@
 Each is followed as `switching_prices.price_step` follows it: its elongation is the polynomial through the nodes, and
 the force of each mode is integrated over the piece of the mode. Where the law is a polynomial and its margin linear,
 all of that is a few sums and products, the same for all, and done in vectors.
+
+A margin may be the lesser of two linear functions. The one by which the first member leaves is taken for all; members
+that leave by the other one fail the check of their switch, and have to be followed one by one.
 """
 
 import numpy as np
@@ -136,8 +139,10 @@ def _check(code, p, curves, rest, time, old, new, i, switching):
 
 @part
 def _linear_margin(code, p, curves, rest, time, mode, works):
-    """The margin of a mode as a linear function, by the first member where it has ended: its slopes by elongation and
-    rate, and the rest.
+    """The margin of a mode as a linear function: its slopes by elongation and rate, and the rest.
+
+    Of two linear functions it is the one that is negative first for the first member; `_check` tells which members
+    leave by the other one.
 
     code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
     time (2,): start and length of the step (s).

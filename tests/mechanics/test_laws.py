@@ -73,8 +73,8 @@ def _margin_by_parameter(code, p, place, x, xd, mode, curves):
 
 
 @compiled
-def _margin(code, p, x, xd, mode, curves):
-    return law_table.law_margin(code, p, x, xd, mode, TIME, curves, REST)
+def _margin(code, p, x, xd, mode, t, curves):
+    return law_table.law_margin(code, p, x, xd, mode, t, curves, REST)
 
 
 @compiled
@@ -123,8 +123,8 @@ class Kernel:
     def margin_by_parameter(self, place, x, xd, mode):
         return _margin_by_parameter(self.code, self.p, place, float(x), float(xd), mode, self.curves)
 
-    def margin(self, x, xd, mode):
-        return _margin(self.code, self.p, float(x), float(xd), mode, self.curves)
+    def margin(self, x, xd, mode, t=TIME):
+        return _margin(self.code, self.p, float(x), float(xd), mode, float(t), self.curves)
 
     def slopes(self, x, xd, mode):
         return _slopes(self.code, self.p, float(x), float(xd), mode, self.curves)
@@ -567,6 +567,35 @@ def test_over_ranges_of_elongation_and_rate_a_margin_is_least_at_a_corner(kind, 
         least = min(kernel.margin(a, b, mode) for a in x for b in xd)
         for a, b in zip(rng.uniform(*x, 9), rng.uniform(*xd, 9), strict=True):
             assert kernel.margin(a, b, mode) >= least - 1e-12 * max(abs(least), 1.0)
+
+
+def test_every_law_that_declares_a_degree_is_tested_here():
+    kinds = (with_modes(kind, np.random.default_rng(1))[0].record for kind in (*SWITCHING, "crush"))
+    tested = [law_table.kernels_of(type(record)) for record in kinds]
+    declared = [each for each in law_table.LISTED if each.modes and each.modes.degree]
+    assert declared
+    assert all(each in tested for each in declared)
+
+
+@every_even
+@many
+@given(seeds)
+def test_a_margin_is_the_lesser_of_at_most_two_linear_functions_and_knows_no_time(kind, seed):
+    rng = np.random.default_rng(seed)
+    kernel, modes = with_modes(kind, rng)
+    assert law_table.kernels_of(type(kernel.record)).modes.degree is not None
+    # along any line of elongations and rates it then bends downwards, and only once
+    for mode in modes:
+        for _ in range(5):
+            x, xd = (np.linspace(*rng.uniform(-9.0, 9.0, 2), 41) for _ in range(2))
+            margins = np.array([kernel.margin(a, b, mode) for a, b in zip(x, xd, strict=True)])
+            assert [kernel.margin(a, b, mode, signed(rng)) for a, b in zip(x, xd, strict=True)] == margins.tolist()
+            bend = np.diff(margins, 2)
+            rounding = 1e-12 * max(np.abs(margins).max(), 1.0)
+            assert bend.max() <= rounding
+            bent = np.flatnonzero(bend < -rounding)
+            # a bend between two samples is in the differences about both
+            assert bent.size == 0 or bent[-1] - bent[0] <= 1
 
 
 @every_even

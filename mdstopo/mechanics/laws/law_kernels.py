@@ -44,8 +44,8 @@ class Modes:
     sharp (p, x, xd, mode, t, curves, l0): whether slopes of the force begin with a root at the end of a mode that is
     nearest, so that steps beside it have to be short; None where that is true of none.
     degree: of a law whose force in a mode is a polynomial in x of this degree at most, and a constant times xd, and
-    whose energy is one in x of the next degree: 1 to 3; None where that is not so, or not known. The margin of such a
-    law is, in every mode, the less of two linear functions of x and xd at most, and knows no time.
+    whose energy is one in x of the next degree: 1 to 3; None where that is not so, or not known. Of such a
+    law the margin of a mode is the lesser of at most two linear functions of elongation and rate, and knows no time.
     pieces: whether modes are pieces of one function that is smooth enough for motion and derivatives, so that only the
     accuracy of steps gains where they end at the end of a mode.
     """

@@ -13,7 +13,7 @@ from mdstopo.compiler.vector import WIDE
 from mdstopo.general.certain_modes import BOUND_LEVELS, NARROW, UNSURE, modes_at_nodes
 from mdstopo.general.loaded_members import add_states, load_all, load_members, take_members
 from mdstopo.general.priced_candidates import CODE, FIRST_STAGE, KIND, LAST_STAGE, MOVES, WHOLE
-from mdstopo.general.sorted_members import CLASSES, COUNT, FROM, TO, UNSORTED, class_of, modes_of_all, sort_members
+from mdstopo.general.sorted_members import CLASSES, COUNT, FROM, TO, UNSORTED, join_class, modes_of_all, sort_members
 from mdstopo.general.switching_prices import ROW, price_step
 from mdstopo.general.switching_together import SUM, TOGETHER, is_quick, price_switched
 from mdstopo.mechanics.laws.law_table import law_is_idle, law_remembers
@@ -32,11 +32,14 @@ from mdstopo.sensitivity.tile_interpolation import (
     take_prices,
 )
 
-#: classes of as many members or fewer are computed member by member; by how much what is left out of a class's prices
-#: in a step may be less than that of all steps
-FEW, OF_CLASSES = 96, 4
-#: the class of members that have their prices; the level of what is no part of those that have bounds
+#: classes of as many members or fewer are computed member by member
+FEW = 96
+#: the prices of a class in a step may be off by this part of what those of all listed steps together may be. It is not
+#: divided by the number of steps, too: over many steps with classes more may add up
+SHARE_OF_A_CLASS = 0.25
+#: the class of members that have their prices
 PAID = -2
+#: the level of columns that are no part of a tile with bounds
 NO_LEVEL = -1
 #: place behind those of the smallest parts: whether all members of the tile are in the model
 LOADED = PARTS
@@ -47,7 +50,7 @@ def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile,
     """Price the members of some columns of a tile in a step.
 
     In:
-      model, candidates, k: as of `tile_sweep.price_run`, of a law whose members are followed.
+      model, candidates, k: as of `tile_prices.price_run`, of a law whose members are followed.
       s: the number of the step.
       level, first, size: of the part, its first column, and how many it has; NO_LEVEL: its members are looked at one by
         one.
@@ -55,7 +58,7 @@ def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile,
       begun: whether members of a law that remembers are in modes.
       tile: grids, i, j and error as of `tile_interpolation.take_prices`.
     In place:
-      buffers: of `tile_sweep.price_run`; of a law that remembers the modes behind the step are set, in row 0 behind a
+      buffers: of `tile_prices.price_run`; of a law that remembers the modes behind the step are set, in row 0 behind a
         whole step, else in row 1, and the permanent sets behind it in `fresh`.
       price (PLACES,): added to.
 
@@ -64,7 +67,7 @@ def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile,
     grids, i, j, _ = tile
     _, lists, _, _, sorting, _ = buffers
     modes, sets, todo, whole = lists[4], lists[5], lists[6], lists[9]
-    kind, classes, mode = sorting[0], sorting[1], sorting[3]
+    kind, classes, places, mode = sorting[0], sorting[1], sorting[2], sorting[3]
     code = candidates.run[k, CODE]
     height, _ = extent(grids, i, j)
     if todo[LOADED] == 0:
@@ -86,11 +89,31 @@ def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile,
         if classes[c, COUNT] > 0 and (stays or is_quick(code, candidates.law[k], model.curves)):
             done += _price_each(model, candidates, k, s, first, size, c, height, to, buffers, price)
         else:
-            for a in range(height):
-                for b in range(a * BROAD + first, a * BROAD + first + size):
-                    if kind[b] == c:
-                        kind[b] = UNSORTED
+            for m in range(_places_of(kind, c, first, size, height, places)):
+                kind[places[m]] = UNSORTED
     return done + _follow_others(model, candidates, k, s, first, size, begun, height, to, buffers, price)
+
+
+@kernel
+def _places_of(kind, c, first, size, height, places):
+    """List the members of a class in some columns of a tile, row by row.
+
+    In:
+      kind (PLACES,): the class of each member.
+      c: the class, or UNSORTED.
+      first, size, height: the first column, how many there are, and how many rows.
+    Out:
+      places (PLACES,): the places of these members in the tile come first.
+
+    Returns how many there are.
+    """
+    count = np.int64(0)
+    for a in range(height):
+        for b in range(a * BROAD + first, a * BROAD + first + size):
+            if kind[b] == c:
+                places[count] = b
+                count += 1
+    return count
 
 
 @kernel
@@ -100,7 +123,7 @@ def _sort_part(model, candidates, k, s, level, first, height, buffers):
 
     model, candidates, k, s, level, first: as of `price_part`.
     height: rows of the tile.
-    buffers: of `tile_sweep.price_run`, of which the sorting is filled.
+    buffers: of `tile_prices.price_run`, of which the sorting is filled.
     """
     _, lists, spans, _, sorting, _ = buffers
     modes, sets = lists[4], lists[5]
@@ -116,11 +139,11 @@ def _sort_part(model, candidates, k, s, level, first, height, buffers):
             at = narrow * NARROW
             modes_at_nodes(model, candidates, k, s, (1 << inner) - 1 + at // size, spans, mode)
             old, new = modes_of_all(mode)
-            if old == UNSORTED and size > NARROW:
+            if old == UNSURE and size > NARROW:
                 continue
             unsorted[narrow : narrow + size // NARROW] = 0
-            if old != UNSORTED:
-                own = class_of(old, new, height * size, classes)
+            if old != UNSURE:
+                own = join_class(old, new, height * size, classes)
                 for a in range(height):
                     kind[a * BROAD + at : a * BROAD + at + size] = own
                 continue
@@ -140,7 +163,7 @@ def _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price
     scratch, lists, _, following, sorting, _ = buffers
     found, works = lists[7], lists[10]
     plan, part_level, _, _, index, values, _ = scratch
-    kind, classes = sorting[0], sorting[1]
+    kind, classes, places = sorting[0], sorting[1], sorting[2]
     step = candidates.step[s]
     height, _ = extent(grids, i, j)
     found[1, 0] = 0.0
@@ -153,12 +176,12 @@ def _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price
             model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], members, classes[c, FROM], found[1, :1], works,
             following, values,
         )  # fmt: skip
-        take_prices(grids, i, j, error / OF_CLASSES, scratch, found[0])
-    for a in range(height):
-        for b in range(first, first + (BROAD >> level)):
-            if kind[a * BROAD + b] == c and part_level[b // SHORT] == DONE:
-                price[a * BROAD + b] += found[0, a * BROAD + b]
-                kind[a * BROAD + b] = PAID
+        take_prices(grids, i, j, error * SHARE_OF_A_CLASS, scratch, found[0])
+    for m in range(_places_of(kind, c, first, BROAD >> level, height, places)):
+        b = places[m]
+        if part_level[b % BROAD // SHORT] == DONE:
+            price[b] += found[0, b]
+            kind[b] = PAID
     return 1.0 * plan[PRICED]
 
 
@@ -180,13 +203,9 @@ def _price_each(model, candidates, k, s, first, size, c, height, to, buffers, pr
     step = candidates.step[s]
     old = classes[c, FROM]
     new = classes[c, TO]
-    count = np.int64(0)
-    for a in range(height):
-        for b in range(a * BROAD + first, a * BROAD + first + size):
-            if kind[b] == c:
-                places[count] = b
-                fresh[b] = sets[0, b]
-                count += 1
+    count = _places_of(kind, c, first, size, height, places)
+    for m in range(count):
+        fresh[places[m]] = sets[0, places[m]]
     if old != new:
         for at in range(0, count, TOGETHER):
             wide = min(TOGETHER, count - at)
@@ -232,12 +251,7 @@ def _follow_others(model, candidates, k, s, first, size, begun, height, to, buff
     kind, places = sorting[0], sorting[2]
     yes = np.bool_(True)
     few = np.zeros(ROW)
-    count = np.int64(0)
-    for a in range(height):
-        for b in range(a * BROAD + first, a * BROAD + first + size):
-            if kind[b] == UNSORTED:
-                places[count] = b
-                count += 1
+    count = _places_of(kind, np.int64(UNSORTED), first, size, height, places)
     for at in range(0, count, ROW):
         wide = min(ROW, count - at)
         take_members(model, places[at : at + wide], wide, np.int64(ROW))

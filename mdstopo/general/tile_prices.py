@@ -3,7 +3,7 @@
 A price is a sum over steps. In a step in which bounds show that all members of a part of the tile stay in one mode
 (`certain_modes`), or all leave it for the same other one, what they do is as smooth in where their ends are as by a
 law without modes: it is computed for a few members, and follows for the others (`sensitivity.tile_interpolation`).
-In other steps members are sorted by what they do (`sorted_sweep`): those of the whole tile, or of the largest parts
+In other steps members are sorted by what they do (`sorted_prices`): those of the whole tile, or of the largest parts
 whose points are evenly spread, where a law does not remember; else of the smallest parts, after all larger ones.
 
 Where a law remembers, steps are gone through in the order of time, with the mode and the permanent set that each member
@@ -33,8 +33,8 @@ from mdstopo.general.priced_candidates import (
     SCENE,
     WHOLE,
 )
-from mdstopo.general.sorted_members import UNSORTED, make_sorting, modes_of_all
-from mdstopo.general.sorted_sweep import LOADED, NO_LEVEL, price_part
+from mdstopo.general.sorted_members import make_sorting, modes_of_all
+from mdstopo.general.sorted_prices import LOADED, NO_LEVEL, price_part
 from mdstopo.general.switching_prices import ROW, add_pieces, make_following, price_point, price_step
 from mdstopo.general.switching_together import make_switching
 from mdstopo.mechanics.kinematics.kinematics_interface import WORKS, member_works
@@ -55,7 +55,7 @@ from mdstopo.sensitivity.tile_interpolation import (
 )
 
 #: parts of a tile of all levels that have lists, of which those of a level begin at 2^level - 1
-PARTS_OF_ALL = 2**LEVELS - 1
+LISTED_PARTS = 2**LEVELS - 1
 #: of each part: the mode that all its members are in, UNSURE where they differ; their least and largest permanent sets
 SHARED = 3
 SAME, LEAST, MOST = range(SHARED)
@@ -73,10 +73,10 @@ def make_lists(candidates):
     """
     most = candidates.step.shape[0] + candidates.pose.shape[0] + 1
     return (
-        np.zeros((PARTS_OF_ALL, most), np.int64),
-        np.zeros((PARTS_OF_ALL, most), np.int64),
-        np.zeros(PARTS_OF_ALL, np.int64),
-        np.zeros((PARTS_OF_ALL, SHARED)),
+        np.zeros((LISTED_PARTS, most), np.int64),
+        np.zeros((LISTED_PARTS, most), np.int64),
+        np.zeros(LISTED_PARTS, np.int64),
+        np.zeros((LISTED_PARTS, SHARED)),
         np.zeros((2, PLACES), np.int64),
         np.zeros((2, PLACES)),
         np.zeros(PARTS + 1, np.int64),
@@ -132,7 +132,7 @@ def price_run(model, candidates, k, tile, scratch, lists, price):
         if followed and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
             ends = np.int64(candidates.step[run[FIRST_STEP] + u, KIND] != WHOLE)
             begun = begun or ends == 0
-    for part in range(PARTS_OF_ALL):
+    for part in range(LISTED_PARTS):
         done += _price_list(model, candidates, k, part, tile, buffers, price)
     return done / max(steps, 1)
 
@@ -151,7 +151,7 @@ def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
         which the lists matter.
       price (PLACES,): added to.
 
-    Returns how many members were followed.
+    Returns how many prices of steps were computed now; those of listed steps come later.
     """
     run = candidates.run[k]
     remembers = law_remembers(run[CODE])
@@ -236,7 +236,7 @@ def _price_sorted(model, candidates, k, u, tile, buffers, price):
             todo[smallest : smallest + size // SHORT] = 0
             modes_at_nodes(model, candidates, k, s, part, spans, mode)
             old, new = modes_of_all(mode)
-            if old == UNSORTED or old != new:
+            if old == UNSURE or old != new:
                 done += price_part(model, candidates, k, s, level, at * size, size, yes, no, tile, buffers, price)
             elif not law_is_idle(candidates.run[k, CODE], old):
                 step[part, count[part]] = u
@@ -275,7 +275,7 @@ def _share(modes, sets, height, shared):
       modes, sets (PLACES,): of all.
       height: rows of the tile.
     Out:
-      shared (PARTS_OF_ALL, SHARED): set.
+      shared (LISTED_PARTS, SHARED): set.
     """
     first = PARTS - 1
     for c in range(PARTS):
@@ -309,7 +309,7 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, 
     model, candidates, k, u, begun, ends, tile, buffers, price: as of `_price_next`.
     smallest: the number of the part among those of its level.
 
-    Returns how many members there are.
+    Returns how many prices of steps were computed now, those of listed steps among them.
     """
     run = candidates.run[k]
     grids, i, j, _ = tile
@@ -330,8 +330,8 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, 
         for a in range(height):
             for b in range(a * BROAD + first, a * BROAD + first + wide):
                 started = begun or ends != 0
-                i = loaded_at(b)
-                price[b] += price_point(model, candidates, k, i, s, modes[ends, b], sets[ends, b], started)
+                member = loaded_at(b)
+                price[b] += price_point(model, candidates, k, member, s, modes[ends, b], sets[ends, b], started)
         return 1.0 * height * wide
     no = np.bool_(False)
     followed = price_part(model, candidates, k, s, np.int64(NO_LEVEL), first, wide, no, begun, tile, buffers, price)
