@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 
 def statements_in(node: ast.AST) -> Iterator[ast.AST]:
-    """The statements right inside of a module, a definition or a compound statement, with what begins its branches.
+    """The statements right inside of a module, a definition or a compound statement, handlers and cases among
+    them.
 
     Expressions are left out: most of a tree consists of them, and they define and import nothing.
     """

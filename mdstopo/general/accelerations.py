@@ -24,6 +24,7 @@ from mdstopo.general.general_model import JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
 from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
 from mdstopo.general.strides import (
     first_freedom,
+    is_spatial,
     pair_freedoms,
     place_in_joint,
     place_in_pair,
@@ -48,7 +49,6 @@ from mdstopo.integrators.banded import factorise, solve
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     attitude,
-    coordinates,
     drive_acceleration,
     drive_state,
     freedoms,
@@ -108,7 +108,7 @@ def make_workspace(model):
     total = model.unknown_index.shape[0]
     both = pair_freedoms(model)
     rows = most_rows(model)
-    stages = max(STAGES) if coordinates(model) != freedoms(model) else 0
+    stages = max(STAGES) if is_spatial(model) else 0
     # where in it each piece ends
     turned = model.home.shape[0] * attitude(model)
     rel = turned + n_pair * pose_size(model)
@@ -173,7 +173,7 @@ def make_workspace(model):
 
 @kernel
 def _scales(model):
-    """(n_place,): of the free coordinates, which make their diagonal about 1; 1 of all others."""
+    """(n_place,): 1/sqrt(mass) of free coordinates, so that their diagonal is about 1; 1 of all else."""
     scale = np.ones(model.unknown_index.shape[0])
     for d in range(model.mass.shape[0]):
         if model.free[d] != 0:
@@ -303,26 +303,27 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, tangents, transp
     each = freedoms(model)
     inertial = workspace.switches[DIAGONAL] == 0
     for p in range(model.pair.shape[0]):
-        for block in range(4):
-            first = each * (block // 2)
-            second = each * (block % 2)
-            body = model.pair[p, block % 2]
-            row = each * model.pair[p, block // 2]
-            column = each * body
-            for i in range(each):
-                if model.free[row + i] == 0:
-                    continue
-                at = model.unknown_index[row + i]
-                for j in range(each):
-                    if model.free[column + j] == 0:
+        for one in range(2):
+            for other in range(2):
+                body = model.pair[p, other]
+                row = first_freedom(model, model.pair[p, one])
+                column = first_freedom(model, body)
+                for i in range(each):
+                    if model.free[row + i] == 0:
                         continue
-                    value = mass[p, first + i, second + j] if inertial else 0.0
-                    if tangent:
-                        value += w_q * slope_by_shift(model, k, p, first + i, second + j, tangents, body)
-                        if damped:
-                            value += w_v * c[p, first + i, second + j]
-                    if value != 0.0:
-                        put(band, half, scale, at, model.unknown_index[column + j], value, transposed)
+                    row_at = each * one + i
+                    for j in range(each):
+                        if model.free[column + j] == 0:
+                            continue
+                        column_at = each * other + j
+                        value = mass[p, row_at, column_at] if inertial else 0.0
+                        if tangent:
+                            value += w_q * slope_by_shift(model, k, p, row_at, column_at, tangents, body)
+                            if damped:
+                                value += w_v * c[p, row_at, column_at]
+                        if value != 0.0:
+                            at = model.unknown_index[row + i]
+                            put(band, half, scale, at, model.unknown_index[column + j], value, transposed)
     for j in range(model.joint.shape[0]):
         for r in range(most_rows(model)):
             own = model.row[j, r]

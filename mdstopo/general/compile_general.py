@@ -33,9 +33,9 @@ from mdstopo.integrators.integrator_choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.kinematics.timed import ADDRESS
 from mdstopo.mechanics.laws import law_table
-from mdstopo.mechanics.laws.spring import FAR
+from mdstopo.mechanics.laws.spring import NEAR_AT
 from mdstopo.scene.bodies import distances, stands_as
-from mdstopo.scene.compile_scene import nearness
+from mdstopo.scene.compile_scene import near_of
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.grid_members import row_of, short_row_of
 from mdstopo.scene.origin import ends_of
@@ -292,8 +292,8 @@ def _members(
                 variable = first + int(part[0]) if group.design else -1
                 blocks.append([pair, start, start + padded, code, variable, count, number, int(part[0]), row])
                 rows.append(law_table.parameters(record, curves))
-                if springs_alone:  # others keep the numbers that they have always had
-                    rows[-1][FAR : FAR + 2] = nearness(group, q_local[part], row > 0)
+                if springs_alone:  # elsewhere zeros: elongations always come from displacements
+                    rows[-1][NEAR_AT : NEAR_AT + 2] = near_of(group, q_local[part], row > 0)
                 powers.append(group.power)
                 columns.append(member)
                 active.append((middle > begin) & (middle < until))

@@ -25,7 +25,7 @@ from mdstopo.general.accelerations import accelerations_jvp, matrices_vjp, turns
 from mdstopo.general.forces import forces_of_sums, place_pairs
 from mdstopo.general.members import sums_at_poses
 from mdstopo.general.step_history import copy_vector
-from mdstopo.general.strides import sums_size
+from mdstopo.general.strides import is_spatial, sums_size
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import DAMPED, TURNING
 from mdstopo.integrators.gauss_tables import LEVELS
@@ -41,7 +41,6 @@ from mdstopo.integrators.rows import (
 )
 from mdstopo.integrators.steps import FORCES, SWEEPS, TANGENTS
 from mdstopo.mechanics.kinematics.kinematics_interface import (
-    coordinates,
     deflection,
     freedoms,
     load_slopes,
@@ -133,8 +132,9 @@ def is_coupled(model, workspace):
 
 @part
 def has_rates(model, workspace):
-    """Whether G depends on y: where anything is damped, and in space, where turning bodies have gyroscopic moments."""
-    return is_coupled(model, workspace) or coordinates(model) != freedoms(model)
+    """Whether accelerations at nodes depend on velocities: where anything is damped, and in space, where turning
+    bodies have gyroscopic moments."""
+    return is_coupled(model, workspace) or is_spatial(model)
 
 
 @kernel
@@ -243,13 +243,14 @@ def fill_slopes(model, workspace, history, o, inverse, maps, by_rows, by_q, by_v
                     _subtract_block(inverse, history.C[o, p], first, each * (i % 2), row, column, each, by_v)
     turn = history.turn[o]
     turns = rotations(model)
-    for first in range(0, m if workspace.switches[TURNING] != 0 else 0, each):
-        column = first + each - turns
-        for d in range(first, first + each):
-            for r in range(turns):
-                by_q[d, column + r] += inverse[d] * turn[d, r]
-            for r in range(turns, load_slopes(model)):
-                by_v[d, column + r - turns] += inverse[d] * turn[d, r]
+    if workspace.switches[TURNING] != 0:
+        for first in range(0, m, each):
+            column = first + each - turns
+            for d in range(first, first + each):
+                for r in range(turns):
+                    by_q[d, column + r] += inverse[d] * turn[d, r]
+                for r in range(turns, load_slopes(model)):
+                    by_v[d, column + r - turns] += inverse[d] * turn[d, r]
     window_slopes(model, maps, coupled, by_q, by_v)
     if by_rows:
         take_rows(by_q, np.int64(m), by_x)

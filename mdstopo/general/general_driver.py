@@ -82,6 +82,10 @@ if TYPE_CHECKING:
 ROWS = 6
 #: where a spring's damping stands among the parameters of its law
 DAMPING = 1
+#: places of the arguments that may be others at each evaluation: of `_simulate_arguments` `tangent`, of
+#: `_plain_arguments` `count` and `window`
+TANGENT_AT = 4
+COUNT_AT, WINDOW_AT = 6, 10
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -427,7 +431,7 @@ class GeneralDriver:
         """Rows of the only response, with their gradients; False where these are still to be found."""
         (reduction,) = self.scene.reductions
         found, differentiated = self.ready.often(
-            "peaks_vjp", self.entry.peaks_vjp, (self.floats, self.rows), ((6, count), (10, window)),
+            "peaks_vjp", self.entry.peaks_vjp, (self.floats, self.rows), ((COUNT_AT, count), (WINDOW_AT, window)),
             lambda: self._plain_arguments(count, window),
         )  # fmt: skip
         self.found[0] = found
@@ -436,7 +440,7 @@ class GeneralDriver:
         return bool(differentiated)
 
     def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:
-        """All arguments of `peaks_vjp`; `_find_peaks_with_gradients` says where count and window stand."""
+        """All arguments of `peaks_vjp`; count and window stand at `COUNT_AT` and `WINDOW_AT`."""
         both = self.scene.reductions[0].is_magnitude
         return (
             *self.steps_arguments(count), 0, both, self.steps_are_fine, window, self.room, self.room_ints,
@@ -626,7 +630,7 @@ class GeneralDriver:
         )  # fmt: skip
 
     def _simulate_arguments(self, tangent: bool) -> tuple[Any, ...]:
-        """The arguments of the entry that makes steps; `run` says where `tangent` stands."""
+        """The arguments of the entry that makes steps; `tangent` stands at `TANGENT_AT`."""
         return (
             self.ints, self.floats, self.method.tables, self._alpha, tangent, self.settings, self.limits, self.room,
             self.room_ints, self.member_state, self.work, self.where,
@@ -649,7 +653,7 @@ class GeneralDriver:
         while True:
             self.work.fill(0)
             code, count, self.events, time = self.ready.often(
-                "simulate", self.entry.simulate, (self.floats,), ((4, tangent),),
+                "simulate", self.entry.simulate, (self.floats,), ((TANGENT_AT, tangent),),
                 lambda: self._simulate_arguments(tangent),
             )  # fmt: skip
             if code != NEEDS_ROOM:

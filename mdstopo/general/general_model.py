@@ -76,7 +76,11 @@ class GeneralModel(NamedTuple):
     ]
     law: Annotated[
         FloatArray,
-        Field("n_block, 8", "the law's parameters (`mechanics.laws.law_table`); of springs `laws.spring.FAR`, too"),
+        Field(
+            "n_block, 8",
+            "the law's parameters (`mechanics.laws.law_table`); of springs from `spring.NEAR_AT` on their row of "
+            "`Model.near`",
+        ),
     ]
     active: Annotated[IndexArray, Field("n_seg, n_block", "1 where the law acts during a segment")]
     level: Annotated[FloatArray, Field("n_seg, n_block, 2", "a tabulated force at the segment's start (N), its slope")]

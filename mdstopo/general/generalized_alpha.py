@@ -158,7 +158,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     shortest = np.empty(n_pair)
     shortest_at_start(model, rel0, shortest)
     span = times[times.shape[0] - 1] - t
-    own = make_step_room(model)
+    step_room = make_step_room(model)
     step = settings[2]
     if not step > 0.0:
         rate = rate_of(model, workspace)
@@ -200,7 +200,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             starting = np.bool_(known == 0)
             code, used, singular = advance(
                 model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance, size,
-                stages, workspace, history, end_q, ends, push, extent, rel0, own, work,
+                stages, workspace, history, end_q, ends, push, extent, rel0, step_room, work,
             )  # fmt: skip
             if code != OK:
                 where[0] = singular
@@ -241,7 +241,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     copy_rows(state, kept)
                     code, _, singular = advance(
                         model, tables[0], member_state, segment, t, middle, starting, q, kept, guess, newton_tolerance,
-                        size, nowhere, workspace, history, beyond_q[top], beyond[top], push, extent, rel0, own, work,
+                        size, nowhere, workspace, history, beyond_q[top], beyond[top], push, extent, rel0,
+                        step_room, work,
                     )  # fmt: skip
                     if code != OK:
                         where[0] = singular
@@ -281,7 +282,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         code, _, singular = advance(
                             model, tables[0], member_state, segment, t, middle, starting, q, kept, guess,
                             newton_tolerance, size, nowhere, workspace, history, trial_q, trial, push, extent,
-                            rel0, own, work,
+                            rel0, step_room, work,
                         )  # fmt: skip
                         if code != OK:
                             where[0] = singular
@@ -296,7 +297,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     lands = lands and t + h >= end
                     code, used, singular = advance(
                         model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance,
-                        size, stages, workspace, history, end_q, ends, push, extent, rel0, own, work,
+                        size, stages, workspace, history, end_q, ends, push, extent, rel0, step_room, work,
                     )  # fmt: skip
                 relative_pose(model, end_q, ends[VELOCITY], rel)
             finite = True

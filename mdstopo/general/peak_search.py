@@ -73,7 +73,7 @@ def evaluate_exactly(tag, motion, j, k, c, who):
 
 
 @kernel
-def kept_energy(tag, motion, k, e):
+def stage_of_energy(tag, motion, k, e):
     """The number of the stage whose stored energy is that at the start (e = 0) or the end (e = 1) of step k; -1 where
     none is.
 
@@ -114,7 +114,7 @@ def sample_ends(tag, motion, j, plain, seen, accelerations):
                 copy_vector(seen[k - 1, LAST], seen[k, 0])
                 copy_vector(accelerations[k - 1, 1], accelerations[k, 0])
                 continue
-            stage = kept_energy(tag, motion, k, e) if stored else -1
+            stage = stage_of_energy(tag, motion, k, e) if stored else -1
             if stage >= 0:
                 seen[k, e * LAST, G] = history.energy[stage, 0]
                 seen[k, e * LAST, DG] = history.energy[stage, 1]

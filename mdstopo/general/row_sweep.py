@@ -31,7 +31,7 @@ from mdstopo.general.step_linear import free_places
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: stages of a step that is short, how many stages of such steps are gathered at once, and of how many rows at most
-SHORT, GATHERED, FEW = 3, 64, 16
+SHORT_STEP, GATHERED, FEW_ROWS = 3, 64, 16
 
 
 class Units(NamedTuple):
@@ -109,7 +109,7 @@ def step_of_rows(
 @part
 def is_short(history, w):
     """Whether step w has few stages."""
-    return history.index[w + 1, FIRST] - history.index[w, FIRST] <= SHORT
+    return history.index[w + 1, FIRST] - history.index[w, FIRST] <= SHORT_STEP
 
 
 @kernel
@@ -120,7 +120,7 @@ def short_steps_of_rows(
 
     tag, model, tables, history, c, lam_q, lam_v, lam_x, z, y, workspace, out, work: as of `step_of_rows`.
     member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member, as in these steps.
-    w, stop: the first step, and the one in front of which the last one begins, at the latest.
+    w, stop: the step to begin with, and the earliest that may be gone through.
     gathered (R, GATHERED, n): scratch.
 
     Returns the number of the step before, or -1.
@@ -130,7 +130,7 @@ def short_steps_of_rows(
     segment = history.index[w, SEGMENT]
     first = gathered.shape[1]
     o = history.index[w + 1, FIRST]
-    while w >= stop and first >= SHORT and is_short(history, w) and history.index[w, SEGMENT] == segment:
+    while w >= stop and first >= SHORT_STEP and is_short(history, w) and history.index[w, SEGMENT] == segment:
         step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, none, no_rows, z, y, workspace, work)
         stages = o - history.index[w, FIRST]
         first -= stages
@@ -294,7 +294,8 @@ def rows_gradients(tag, model, tables, member_state, history, count, which, rows
             )  # fmt: skip
         begins[m] = w
     units = make_units(model, total, out.shape[1])
-    gathers = total <= FEW and history.index[count, EVENTS] == 0
+    # stages of steps lie behind each other in the history, as gathering needs, only where each step's PARENT is w - 1
+    gathers = total <= FEW_ROWS and history.index[count, EVENTS] == 0
     gathers = gathers and model.varied.shape[0] == 0 and bar_set.shape[1] == 0
     gathered = np.empty((total if gathers else 0, GATHERED, n))
     w = begins[0] if total > 0 else -1

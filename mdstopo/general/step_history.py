@@ -163,7 +163,8 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     lam (n_row,): multipliers of the joints.
     workspace: workspace as the balance of the stage has left it.
-    tangent: whether its tangents are stored; where factors are kept, all of these is in place (`keep_in_place`).
+    tangent: whether tangents are stored. Where the history keeps factors nothing is copied: the balance has written
+      there (`keep_in_place`).
     """
     history.when[o] = t
     copy_vector(q, history.stage_q[o])
@@ -182,7 +183,7 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
 
 @part
 def own_arrays(workspace):
-    """The arrays of a workspace in whose place `keep_in_place` puts others."""
+    """The arrays of a workspace in whose place `keep_in_place` puts others: the nine that `take_back` gives back."""
     joints = workspace.turned, workspace.pull, workspace.gram, workspace.diagonal
     return joints, (workspace.rel, workspace.sums), (workspace.k, workspace.c, workspace.turn)
 
@@ -190,6 +191,8 @@ def own_arrays(workspace):
 @part
 def keep_in_place(history, o, workspace):
     """Have the balance of a stage write into the history what is kept of it where factors are: nothing is copied then.
+
+    Every array that is replaced here is among those of `own_arrays`, and `take_back` gives it back.
 
     history: the history of steps (`StepHistory`).
     o: number of the stage.
@@ -210,7 +213,7 @@ def keep_in_place(history, o, workspace):
 
 @part
 def take_back(workspace, own):
-    """Give a workspace its own arrays back, those of `own_arrays`."""
+    """Give a workspace its own arrays back: the nine of `own_arrays`, which `keep_in_place` may have replaced."""
     joints, poses, tangents = own
     workspace.turned, workspace.pull, workspace.gram, workspace.diagonal = joints
     workspace.rel, workspace.sums = poses

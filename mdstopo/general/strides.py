@@ -6,7 +6,7 @@ of these are constants, or a product with one, where a kernel is compiled.
 
 from mdstopo.compiler.jit import part
 from mdstopo.general.general_model import JOINT_FIRST
-from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, rotations
+from mdstopo.mechanics.kinematics.kinematics_interface import coordinates, freedoms, rotations
 
 #: where the force begins in sums over the members of a pair (`sums_size`)
 FORCE = 0
@@ -22,6 +22,12 @@ def pair_freedoms(model):
 def dimensions(model):
     """How many coordinates a point has, and components a displacement: D - T."""
     return freedoms(model) - rotations(model)
+
+
+@part
+def is_spatial(model):
+    """Whether bodies move in space: only there they have more coordinates than freedoms."""
+    return coordinates(model) != freedoms(model)
 
 
 @part

@@ -7,20 +7,22 @@ from mdstopo.general.general_model import CODE, ENERGY, INERTER, KIND, PAIR
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, load_slopes, rotations
 from mdstopo.mechanics.laws.law_table import SPRING
 
+#: how many switches a workspace has
+SWITCHES = 8
 #: places of a workspace's `switches`: whether the mass is diagonal; whether the factors in the workspace are those of
 #: the joints' matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small
 #: eigenvalue; whether tangents leave out the joints' part; whether loads may depend on how bodies turn (else `turn`
 #: stays zero); whether tangents are left as what they follow from: poses and sums over members of pairs, and the state;
-#: whether a response is the stored energy, which is then kept at stages
-DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING, UNFORMED, STORED = range(8)
+#: whether a response is the stored energy, which is then kept at stages where steps begin or end
+DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING, UNFORMED, STORED = range(SWITCHES)
 #: which bodies of a pair move (`movers`)
 BOTH, SECOND, FIRST = 1, 2, 3
 
 
 @kernel
 def switches_of(model):
-    """The switches (8,) of a new workspace, for members that switch."""
-    switches = np.zeros(8, np.int64)
+    """The switches (SWITCHES,) of a new workspace: what the scene decides once."""
+    switches = np.zeros(SWITCHES, np.int64)
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
     switches[DAMPED] = 1 if is_damped(model) else 0
     switches[THOROUGH] = 1

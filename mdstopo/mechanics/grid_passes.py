@@ -8,7 +8,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes
-from mdstopo.mechanics.laws.spring import hardly_moved
+from mdstopo.mechanics.laws.spring import is_near
 from mdstopo.mechanics.laws.spring_grid import grid_design, grid_force, grid_tangent
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.scene.springs_model import DESIGN, EXCESS, L0, PAIR, PX, PY, QX, QY, ROWS, STIFFNESS, TILE, WIDTH
@@ -64,7 +64,7 @@ def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, su
             for j in range(m):
                 r = rel[j, p]
                 o = sums[j, column]
-                close = hardly_moved(r, near)
+                close = is_near(r, near)
                 if tangent:
                     found = grid_tangent(px, py, qx, qy, l0, excess, ks, width, first, last, r, close, own)
                     add_forces(found[:4], counted, o)
@@ -96,7 +96,7 @@ def design_grid(start, stop, width, near, member, pose, u, weight, out):
     turned = np.empty((pose.shape[0], 5, lanes()))
     close = np.empty(pose.shape[0], np.bool_)
     for j in range(pose.shape[0]):
-        close[j] = hardly_moved(pose[j], near)
+        close[j] = is_near(pose[j], near)
     for row in range(0, rows, tall):
         lo = start + row * width
         hi = start + min(row + tall, rows) * width

@@ -17,7 +17,7 @@ from mdstopo.mechanics.laws.spring import (
     elastic_design,
     elastic_force,
     elastic_tangent,
-    hardly_moved,
+    is_near,
     stored_energy,
     viscous_design,
     viscous_force,
@@ -280,11 +280,11 @@ def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, c
             o = sums[j, column]
             if not viscous:
                 if tangent:
-                    found = elastic_tangent(rows, width, scale, lo, hi, r, hardly_moved(r, near))
+                    found = elastic_tangent(rows, width, scale, lo, hi, r, is_near(r, near))
                     add_forces(found[:4], counted, o)
                     add_tangent(found[4:], o)
                 else:
-                    found_force = elastic_force(rows, width, scale, lo, hi, r, hardly_moved(r, near))
+                    found_force = elastic_force(rows, width, scale, lo, hi, r, is_near(r, near))
                     add_forces(found_force, counted, o)
                 continue
             cs = strength[SCALED_DAMPING, lo:hi]

@@ -82,7 +82,7 @@ NEAR = 0.01
 
 @dataclass(frozen=True)
 class Members:
-    """The arrays that all load cases have in common, as in `Model`: pairs (n, 2), blocks, powers, nearness, member
+    """The arrays that all load cases have in common, as in `Model`: pairs (n, 2), blocks, powers, `near`, member
     arrays; and the shortest initial length of each block."""
 
     pairs: IndexArray
@@ -115,7 +115,7 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
     for group, block in zip(case.members, blocks, strict=True):
         _fill(group, block, member)
     near = [
-        nearness(group, member[[QX, QY], block[START] : block[STOP]].T, block[WIDTH] > 0)
+        near_of(group, member[[QX, QY], block[START] : block[STOP]].T, block[WIDTH] > 0)
         for group, block in zip(case.members, blocks, strict=True)
     ]
     return Members(
@@ -128,7 +128,7 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
     )
 
 
-def nearness(group: MemberGroup, second_ends: FloatArray, in_rows: bool) -> list[float]:
+def near_of(group: MemberGroup, second_ends: FloatArray, in_rows: bool) -> list[float]:
     """A row of `Model.near`: how far bodies may have moved for elongations to come from displacements.
 
     second_ends (M, 2): in the axes of their body (m). in_rows: whether members are summed by the rows of a grid.

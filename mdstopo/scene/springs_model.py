@@ -100,7 +100,7 @@ class Model(NamedTuple):
         Field(
             "n_block, 2",
             "squares of the shift (m²) and of the turn up to which elongations come from displacements "
-            "(`mechanics.laws.spring.hardly_moved`)",
+            "(`mechanics.laws.spring.is_near`)",
         ),
     ]
     member: Annotated[

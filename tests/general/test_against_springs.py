@@ -13,7 +13,7 @@ from mdstopo.general.compile_general import compile_general
 from mdstopo.general.general_driver import GENERAL, GeneralDriver
 from mdstopo.integrators.integrator_choice import method_of
 from mdstopo.integrators.scene_driver import DriverOptions
-from mdstopo.mechanics.laws.spring import FAR
+from mdstopo.mechanics.laws.spring import NEAR_AT
 from mdstopo.sensitivity.springs_driver import SPRINGS
 
 CASE = """
@@ -73,10 +73,10 @@ def test_how_far_bodies_may_move_for_displacements_to_tell_is_that_of_springs_al
     case = read_case(CASE)
     (scene,) = SPRINGS.scenes(case).values()
     (general,) = GENERAL.scenes(case).values()
-    assert np.array_equal(general.model.law[:, FAR:], scene.model.near)
-    assert np.all(general.model.law[:, FAR:] > 0.0)
+    assert np.array_equal(general.model.law[:, NEAR_AT:], scene.model.near)
+    assert np.all(general.model.law[:, NEAR_AT:] > 0.0)
     (jointed,) = GENERAL.scenes(read_case(CASE + JOINT)).values()
-    assert not jointed.model.law[:, FAR:].any()
+    assert not jointed.model.law[:, NEAR_AT:].any()
 
 
 def test_a_scene_of_springs_keeps_its_own_kernels():

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mdstopo.general.general_model import MEMBER_EXCESS
 from mdstopo.mechanics.kinematics import planar_grids
 from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.laws.law_table import SPRING
-from mdstopo.mechanics.laws.spring import FAR
+from mdstopo.mechanics.laws.spring import NEAR_AT
 from mdstopo.mechanics.passes import SUMS
 from tests.space.in_python import in_python, same
 
@@ -144,20 +145,32 @@ def test_the_derivative_of_many_poses_is_the_sum_of_theirs(length: int) -> None:
 @pytest.mark.usefixtures("in_python")
 @pytest.mark.parametrize("row", [11, 0])
 def test_far_from_home_elongations_are_differences_of_lengths_and_the_same(row: int) -> None:
-    """Springs one by one always take displacements; close to home those with the squares of FAR do so, too."""
+    """Springs one by one always take displacements; close to home those with a row of `Model.near` do so, too.
+
+    Lengths alone need no excess, so another one shows what elongations came from.
+    """
     (model, states), count, p = grid(11), ROWS * 11, law("elastic")
-    p[FAR:] = 1e-8
+    p[NEAR_AT:] = 1e-8
+    member = model.member.copy()
+    member[MEMBER_EXCESS] += 1.0
+    other = SimpleNamespace(**{**vars(model), "member": member})
     rel, u = np.zeros((2, 2, POSE)), np.random.default_rng(3).normal(size=(2, 2, 3))
     states[0, START + count :] = 0.0
     for s, near in enumerate((1.0, 1e-7)):
         r = rel[s, 0] = pose(near)
-        found, usual, expected = np.zeros((3, SUMS))
+        found, seen, expected = np.zeros((3, SUMS))
         KERNELS.spring_sums(model, p, START, count, row, True, states, r, True, found)
-        KERNELS.spring_sums(model, law("elastic"), START, count, row, True, states, r, True, usual)
+        KERNELS.spring_sums(other, p, START, count, row, True, states, r, True, seen)
         KERNELS.member_sums(model, SPRING, p, START, count, True, 0.0, 0.0, states, r, True, expected)
         same(found, expected, 1e-12)
-        assert np.array_equal(found, usual) == (near < 1e-3)
+        assert np.array_equal(found, seen) == (near == 1.0)
     found, expected = np.zeros((2, WIDTH))
     KERNELS.spring_designs(model, p, START, count, row, rel, u, 0, found)
     KERNELS.spring_designs(model, law("elastic"), START, count, row, rel, u, 0, expected)
+    same(found, expected, 1e-12)
+    found, expected = np.zeros((2, WIDTH))
+    KERNELS.spring_designs(other, p, START, count, row, rel, u, 0, found)
+    far = model if row else other  # one by one, derivatives always take displacements
+    KERNELS.spring_designs(far, p, START, count, row, rel[:1], u[:1], 0, expected)
+    KERNELS.spring_designs(other, p, START, count, row, rel[1:], u[1:], 0, expected)
     same(found, expected, 1e-12)

@@ -6,7 +6,7 @@ Delta' = n . (d' + theta' (e_y, -e_x)). All is summed in units of the stiffness 
 a row begins early enough to end with it, and its lanes that the vector before has summed count as 0.
 
 Where bodies have moved so far from home that displacements are no more accurate than lengths, elongations are
-differences of lengths (`spring.hardly_moved`, with the squares that the law's parameters have from FAR on).
+differences of lengths (`spring.by_displacements`).
 
 Arguments: member (6 M,), the rows of `GeneralModel.member` behind each other, width M of each; start, count: the first
 member, and how many there are, without padding; length: members of a row, at least as many as a vector has; r (POSE,):
@@ -18,7 +18,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, load, store, total, unmarked, where_larger, zero
 from mdstopo.mechanics.grid_passes import PLACES
-from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, is_close
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, by_displacements
 from mdstopo.mechanics.laws.spring_grid import (
     add_column,
     add_member,
@@ -104,7 +104,7 @@ def _sum_tile(member, width, scale, start, first, last, length, p, r, counted, t
       room (rows, 4): scratch.
     """
     elastic_alone = p[1] == 0.0 and p[2] == 0.0
-    close = is_close(r, p)
+    close = by_displacements(r, p)
     _begin_rows(member, width, start, length, r, room)
     damping = p[1] / p[0]
     preload = p[2] / p[0]
@@ -196,7 +196,7 @@ def grid_designs(member, width, start, count, length, p, rel, u, pair, out):
     turned = np.empty((rel.shape[0], 5, lanes()))
     close = np.empty(rel.shape[0], np.bool_)
     for m in range(close.shape[0]):
-        close[m] = is_close(rel[m, pair], p)
+        close[m] = by_displacements(rel[m, pair], p)
     for row in range(0, rows, tall):
         own = room[: min(tall, rows - row)]
         at = start + row * length

@@ -30,10 +30,10 @@ from mdstopo.mechanics.laws.alike import (
 from mdstopo.mechanics.laws.law_table import SPRING, law, law_is_idle
 from mdstopo.mechanics.laws.spring import (
     ZERO_LENGTH_SQUARED,
+    by_displacements,
     elastic_force,
     elastic_tangent,
     elongation_of,
-    is_close,
 )
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.scene.springs_model import EXCESS, HOME_X, HOME_Y, L0, PX, PY, QX, QY
@@ -245,11 +245,12 @@ def _springs_of_no_grid(rows, width, scale, start, stop, p, r, counted, tangent,
         if tangent:
             alike_tangent(rows, width, scale, start, stop, p, r, o)
     elif tangent:
-        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r, is_close(r, p))
+        close = by_displacements(r, p)
+        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r, close)
         add_forces((c * x, c * y, c * t, c * e), counted, o)
         add_tangent((c * kxx, c * kxy, c * kyy, c * kxt, c * kyt, c * ktt), o)
     else:
-        x, y, t, e = elastic_force(rows, width, scale, start, stop, r, is_close(r, p))
+        x, y, t, e = elastic_force(rows, width, scale, start, stop, r, by_displacements(r, p))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
 
 

@@ -31,6 +31,10 @@ from mdstopo.mechanics.laws.sums import upper_triangle
 ELASTIC = 0
 VISCOUS = 1
 
+#: where in a spring's parameters in a general scene its row of `Model.near` begins; zeros mean: elongations always come
+#: from displacements
+NEAR_AT = 6
+
 #: below this squared length (m^2) a member counts as having no direction
 ZERO_LENGTH_SQUARED = 1e-30
 
@@ -57,7 +61,7 @@ def _elongation(rx, ry, r2, y, ux, uy, free, excess):
 
 
 @part
-def hardly_moved(r, near):
+def is_near(r, near):
     """Whether a pose r (POSE,) is so near home that members would lose digits in a difference of lengths.
 
     near (2,): a row of `scene.springs_model.Model.near`. Beyond it, elongations from displacements are no better.
@@ -65,15 +69,10 @@ def hardly_moved(r, near):
     return r[10] * r[10] + r[11] * r[11] < near[0] and r[12] * r[12] + r[13] * r[13] < near[1]
 
 
-#: where among a spring's parameters in a general scene a row of `Model.near` begins; zeros: elongations come from
-#: displacements wherever bodies are
-FAR = 6
-
-
 @part
-def is_close(r, p):
-    """`hardly_moved` at a pose r (POSE,) by the parameters p (8,) of a spring."""
-    return p[FAR] == 0.0 or hardly_moved(r, p[FAR : FAR + 2])
+def by_displacements(r, p):
+    """Whether elongations come from displacements at a pose r (POSE,), by the parameters p (8,) of a spring."""
+    return p[NEAR_AT] == 0.0 or is_near(r, p[NEAR_AT : NEAR_AT + 2])
 
 
 @part
@@ -121,7 +120,7 @@ def elastic_force(member, width, scale, start, stop, r, close):
     scale (stop or more,): k times alpha^mu (N/m).
     start, stop: places of the members, a multiple of the vector's width.
     r (POSE,): relative pose.
-    close: whether elongations come from displacements (`hardly_moved`).
+    close: whether elongations come from displacements (`is_near`).
 
     Returns Q (3 numbers; N, N, N m) and E (J).
     """
@@ -173,7 +172,7 @@ def elastic_tangent(member, width, scale, start, stop, r, close):
     scale (stop or more,): k times alpha^mu (N/m).
     start, stop: places of the members, a multiple of the vector's width.
     r (POSE,): relative pose.
-    close: whether elongations come from displacements (`hardly_moved`).
+    close: whether elongations come from displacements (`is_near`).
 
     Returns Q (3 numbers; N, N, N m), E (J) and the upper triangle xx, xy, yy, xt, yt, tt of K.
     """

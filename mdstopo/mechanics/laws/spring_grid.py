@@ -10,7 +10,7 @@ a = R q of a column and e = d - p of a row, r = a + e; so in a column, where a s
 Rows are padded by members of no stiffness at the row's last point, so that vectors take whole columns.
 Arguments: member arrays (n,) of whole rows, beginning at the first of them; the places of a row; the columns from
 `first` to `last`; the pose r (POSE,); close, whether it is near home
-(`spring.hardly_moved`); room (rows, 2) for what belongs to rows.
+(`spring.is_near`); room (rows, 2) for what belongs to rows.
 """
 
 import math
@@ -61,7 +61,7 @@ def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room
     width: places in a row.
     first, last: the columns from first to before last are summed.
     r (POSE,): relative pose.
-    close: whether elongations come from displacements (`spring.hardly_moved`).
+    close: whether elongations come from displacements (`spring.is_near`).
     room (rows, 2): room for e of the rows.
 
     Returns Q (3 numbers; N, N, N m) and E (J).
@@ -233,7 +233,7 @@ def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, ro
     width: places in a row.
     first, last: the columns from first to before last are summed.
     r (POSE,): relative pose.
-    close: whether elongations come from displacements (`spring.hardly_moved`).
+    close: whether elongations come from displacements (`spring.is_near`).
     room (rows, 2): room for e of the rows.
 
     Returns Q (3 numbers; N, N, N m), E (J) and the upper triangle xx, xy, yy, xt, yt, tt of K.
@@ -325,7 +325,7 @@ def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, 
       width: places in a row.
       first, last: the columns from first to before last are meant.
       pose (poses, POSE): relative poses.
-      close (poses,): whether elongations come from displacements there (`spring.hardly_moved`).
+      close (poses,): whether elongations come from displacements there (`spring.is_near`).
       u (m, 3): virtual changes of the first poses.
       weight (poses - m,): of the energies at the others.
     Out:
