@@ -8,7 +8,7 @@ from mdstopo.general.accelerations import NO_SHIFT, factor_matrix, joint_state, 
 from mdstopo.general.compile_general import compile_general
 from mdstopo.general.general_model import pack_general, unpack_general
 from mdstopo.general.joint_matrix import decompose, substitute, weakest
-from mdstopo.general.switches import OF_JOINTS, UNFORMED
+from mdstopo.general.switches import OF_JOINTS, SWITCHES
 from mdstopo.mechanics.kinematics.planar import turn_bodies
 from tests.compiled import compiled
 from tests.space.in_python import in_python  # noqa: F401
@@ -82,7 +82,7 @@ def model_of(text):
 
 def solved(model, q, a, lam, transposed=False):
     """The place at which the balance is singular, Phi_q (n_row, n) and which factors were made; a, lam in place."""
-    jac, factors = np.zeros((len(model.joint), 3, 6)), np.zeros(UNFORMED + 1, np.int64)
+    jac, factors = np.zeros((len(model.joint), 3, 6)), np.zeros(SWITCHES, np.int64)
     singular = _solve(*pack_general(model), q, transposed, a, lam, jac, factors)
     dense = np.zeros((len(lam), len(a)))
     for j, (_, one, two, *_) in enumerate(model.joint.tolist()):
