@@ -209,13 +209,10 @@ def _price_each(model, candidates, k, s, first, size, c, height, to, buffers, pr
     if old != new:
         for at in range(0, count, TOGETHER):
             wide = min(TOGETHER, count - at)
-            for m in range(wide):
-                switching[5][0, m] = sets[0, places[at + m]]
             take_members(model, places[at : at + wide], wide, np.int64(TOGETHER))
             price_switched(model, candidates, k, wide, s, old, new, switching)
             for m in range(wide):
                 b = places[at + m]
-                fresh[b] = switching[5][1, m]
                 if switching[4][SUM, m] == switching[4][SUM, m]:
                     price[b] += switching[4][SUM, m]
                     modes[to, b] = new

@@ -22,12 +22,10 @@ from mdstopo.mechanics.laws.law_table import (
     law_is_idle,
     law_is_timed,
     law_lacks_rate,
-    law_makes_set,
     law_margin,
     law_margin_slopes,
     law_next,
     law_remembers,
-    law_set,
 )
 
 #: members that are followed at once
@@ -44,14 +42,13 @@ GONE = 1e-10
 @kernel
 def make_switching():
     """What following many members needs: what they do at nodes; polynomials through these, of the margin, and of a law;
-    what is found of each member; permanent sets, and those that are made."""
+    what is found of each member."""
     return (
         np.zeros((NODES, WORKS, TOGETHER)),
         np.zeros((NODE_ROWS, NODES, TOGETHER)),
         np.zeros((NODES, TOGETHER)),
         np.zeros((4, 5)),
         np.zeros((5, TOGETHER)),
-        np.zeros((2, TOGETHER)),
     )
 
 
@@ -76,10 +73,9 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
       s: the number of the step.
       old, new: the modes.
     In place:
-      switching: of `make_switching`: sets in row 0 are those with which members begin; of what is found SUM counts, NaN
-        where a member has to be followed by itself; sets in row 1 are those with which they end.
+      switching: of `make_switching`: of what is found SUM counts, NaN where a member has to be followed by itself.
     """
-    works, power, margin, _, found, sets = switching
+    works, power, margin, _, found = switching
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     time = candidates.step_time[s]
@@ -87,8 +83,6 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
     for m in range(NODES):
         o = candidates.step[s, FIRST_NODE] + m
         member_works(model, np.int64(0), count, candidates.node_pose[o], candidates.node_change[o], works[m])
-        for i in range(0, count, lanes()):
-            store(works[m, ELONGATION], i, load(works[m, ELONGATION], i) - load(sets[0], i))
     by_x, by_rate, rest = _linear_margin(code, p, model.curves, free[0], time, old, works)
     for i in range(0, count, lanes()):
         for a in range(NODES):
@@ -102,7 +96,6 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
     _locate(count, by_x, by_rate, rest, works, margin, found)
     for i in range(0, count, lanes()):
         store(found[SUM], i, zero())
-        store(sets[1], i, load(sets[0], i))
     for i in range(count):
         _check(code, p, model.curves, free[i], time, old, new, i, switching)
     if candidates.step[s, MOVES] != 0:
@@ -111,14 +104,14 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
 
 @part
 def _check(code, p, curves, rest, time, old, new, i, switching):
-    """Set the permanent set with which a member ends, and its SUM to NaN where its switch is not the one that is meant.
+    """Set the SUM of a member to NaN where its switch is not the one that is meant.
 
     code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
     time (2,): start and length of the step (s).
     old, new, switching: as of `price_switched`.
     i: the member.
     """
-    works, power, _, _, found, sets = switching
+    _, power, _, _, found = switching
     c = found[AT, i]
     x = _of_member(power[ELONGATION], c, i)
     rate = _of_member(power[RATE], c, i)
@@ -131,15 +124,6 @@ def _check(code, p, curves, rest, time, old, new, i, switching):
         or law_next(code, p, x, rate, second, old, t, curves, rest) != new
     ):
         found[SUM, i] = np.nan
-    if not law_makes_set(code, old, new):
-        return
-    growth = law_set(code, p, x, old, new)
-    sets[1, i] += growth
-    for m in range(1, NODES):
-        x = works[m, ELONGATION, i] - growth
-        t = time[0] + NODE[m] * time[1]
-        if NODE[m] > c and law_margin(code, p, x, works[m, RATE, i], new, t, curves, rest) < 0.0:
-            found[SUM, i] = np.nan
 
 
 @part
@@ -217,7 +201,7 @@ def _add_pieces(model, candidates, k, s, count, old, new, switching):
 
     model, candidates, k, s, count, old, new, switching: as of `price_switched`.
     """
-    works, power, _, law_power, found, sets = switching
+    works, power, _, law_power, found = switching
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     first = candidates.step[s, FIRST_NODE]
@@ -230,14 +214,6 @@ def _add_pieces(model, candidates, k, s, count, old, new, switching):
         mode = old if piece == 0 else new
         if law_is_idle(code, mode):
             continue
-        if piece == 1:
-            least = sets[1, 0] - sets[0, 0]
-            most = least
-            for i in range(count):
-                least = min(least, sets[1, i] - sets[0, i])
-                most = max(most, sets[1, i] - sets[0, i])
-            low -= most
-            high -= least
         middle, inverse, by_rate, places = fill_law(
             code, p, model.curves, candidates.step_time[s, 0], 0.0, low, high, mode, law_power[2:], law_power
         )  # fmt: skip
@@ -247,11 +223,10 @@ def _add_pieces(model, candidates, k, s, count, old, new, switching):
             if piece == 1:
                 begin = wide
                 wide = 1.0 - wide
-            growth = load(sets[1], i) - load(sets[0], i) if piece == 1 else zero()
             total = zero()
             for g in range(GAUSS.shape[1]):
                 u = (begin + wide * GAUSS[0, g]) * 2.0 - 1.0
-                x = ((_at(power[ELONGATION], u, i) - growth) - middle) * inverse
+                x = (_at(power[ELONGATION], u, i) - middle) * inverse
                 work = at_places(law_power[0], places, x)
                 if by_rate != 0.0:
                     work += by_rate * _at(power[RATE], u, i)
