@@ -14,8 +14,8 @@ from mdstopo.bench.tables import Table, significant, verdict
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general.extremes import FRACTION, STEP
-from mdstopo.general.general_driver import GeneralDriver
+from mdstopo.general.driver.general_driver import GeneralDriver
+from mdstopo.general.responses.extremes import FRACTION, STEP
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.starts.single_start import make_optimizer
 

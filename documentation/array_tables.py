@@ -1,8 +1,8 @@
 """The arrays that kernels work on as Markdown, from the tables by which they are packed (`mdstopo.compiler.fields`)."""
 
 from mdstopo.compiler.fields import Fields
-from mdstopo.general.general_model import FIELDS as GENERAL
-from mdstopo.general.step_history import FIELDS as HISTORY
+from mdstopo.general.model.general_model import FIELDS as GENERAL
+from mdstopo.general.steps.step_history import FIELDS as HISTORY
 from mdstopo.integrators.steps import ARRAYS as STEPS
 from mdstopo.scene.packing import FIELDS as SPRINGS
 

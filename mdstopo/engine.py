@@ -39,7 +39,7 @@ from mdstopo.warm import BackgroundCompiler
 
 if TYPE_CHECKING:
     from mdstopo.error_estimate import Estimator
-    from mdstopo.general.general_driver import GeneralDriver
+    from mdstopo.general.driver.general_driver import GeneralDriver
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
     from mdstopo.scene.design_map import DesignMap
@@ -428,7 +428,7 @@ class Evaluator:
         usual = self._usual
         if not self.may_simulate_to_choose:
             return usual
-        from mdstopo.general.stiffness import held_short, windows_held_short
+        from mdstopo.general.driver.stiffness import held_short, windows_held_short
 
         if usual[0] == SMOOTH:
             held = self._held(SMOOTH, windows_held_short)
@@ -484,7 +484,7 @@ class Evaluator:
         chooses = self.case.solver.integrator == AUTO and self.case.solver.step is None
         if not chooses or not self.beyond or self._usual[0] not in (ADAPTIVE, SMOOTH) or self.case.dimension > 2:
             return False
-        from mdstopo.general.variables import has_damping
+        from mdstopo.general.scene.variables import has_damping
 
         return has_damping(self.case)
 
@@ -598,7 +598,7 @@ def _family(beyond: str) -> SceneFamily:
     """The kernels that a case needs; beyond: what in it goes beyond springs between free bodies (`scene.family`)."""
     if not beyond:
         return SPRINGS
-    from mdstopo.general.general_driver import GENERAL
+    from mdstopo.general.driver.general_driver import GENERAL
 
     return GENERAL
 

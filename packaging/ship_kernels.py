@@ -36,7 +36,7 @@ from mdstopo.case.model import SolverSettings
 from mdstopo.compiler import store
 from mdstopo.compiler.entry import DTYPES, Entry, types_of
 from mdstopo.compiler.threads import cores
-from mdstopo.general.entries import entries_of
+from mdstopo.general.driver.entries import entries_of
 from mdstopo.integrators.integrator_choice import method_of
 
 HERE = Path(__file__).resolve().parent
@@ -45,7 +45,7 @@ TABLE = HERE / "entries.txt"
 #: processes do little twice
 SPACE, REST = "space", "rest"
 #: the integers of a packed scene: in a plane, and in space, which is known by their dimensions
-#: (`general.general_model`)
+#: (`general.model.general_model`)
 PLANAR_SCENE, SPATIAL_SCENE = "q1", "q2"
 
 

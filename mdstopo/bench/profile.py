@@ -20,7 +20,7 @@ from mdstopo.bench.tables import Table, significant
 from mdstopo.case.model import Case
 from mdstopo.compiler.entry import Entry
 from mdstopo.engine import Evaluator
-from mdstopo.general.general_driver import GeneralDriver
+from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: what force sums are for, by the name of their count, beside the stages of the steps
 PURPOSES = {

@@ -1,6 +1,6 @@
 """The integrators that a case file may name: what is declared of each, one record an integrator.
 
-What a record names has the interface of `integrators.steps_interface` and `general.method_interface`.
+What a record names has the interface of `integrators.steps_interface` and `general.steps.method_interface`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ class IntegratorKind(NamedTuple):
     name: as case files have it; doc: a sentence for the case reference. made_by: module:function, called with the
     solver's settings, which returns the `integrators.scene_driver.Method`.
     springs: the module with its entries for springs between free bodies (`integrators.steps_interface`); general: that
-    for all other scenes (`general.method_interface`). Empty where there are none.
+    for all other scenes (`general.steps.method_interface`). Empty where there are none.
     adaptive: whether it chooses steps by the tolerance where none is given. finds_step: whether it finds a fixed step
     by itself. order: of the error of fixed steps in their length.
     explicit: whether stages follow from those before them. has_radius: whether it takes a spectral radius; iterative:
@@ -46,7 +46,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             "adaptive collocation at Gauss nodes; for free bodies between which forces are smooth",
             "mdstopo.integrators.integrator_choice:gauss",
             springs="mdstopo.integrators.springs_gauss_entry",
-            general="mdstopo.general.gauss_entry",
+            general="mdstopo.general.integrators.gauss_entry",
             adaptive=True,
             free_only=True,
         ),
@@ -55,7 +55,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             "explicit and adaptive; for everything",
             "mdstopo.integrators.integrator_choice:runge_kutta",
             springs="mdstopo.integrators.springs_runge_kutta_entry",
-            general="mdstopo.general.runge_kutta_entry",
+            general="mdstopo.general.integrators.runge_kutta_entry",
             adaptive=True,
             explicit=True,
         ),
@@ -64,7 +64,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             "implicit, fixed steps; for stiff scenes and the paper's figures",
             "mdstopo.integrators.integrator_choice:generalized_alpha",
             springs="mdstopo.integrators.springs_generalized_alpha_entry",
-            general="mdstopo.general.generalized_alpha_entry",
+            general="mdstopo.general.integrators.generalized_alpha_entry",
             finds_step=True,
             has_radius=True,
             iterative=True,
@@ -73,7 +73,7 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             "esdirk",
             "implicit, adaptive and L-stable, of order 4; for stiff contacts and dampers in a plane",
             "mdstopo.integrators.integrator_choice:esdirk",
-            general="mdstopo.general.esdirk",
+            general="mdstopo.general.integrators.esdirk",
             adaptive=True,
             order=4,
             planar=True,

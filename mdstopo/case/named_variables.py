@@ -24,7 +24,7 @@ from mdstopo.case.words import did_you_mean, inside, listed, number_text, shown
 
 #: what may follow from a name that varies
 ALLOWED = "numbers of laws, places of grids of points that members end at, masses, loads and velocities at the start"
-#: the sections whose numbers are masses, loads and velocities, or move the scene (`general.numbers_of_scene`)
+#: the sections whose numbers are masses, loads and velocities, or move the scene (`general.scene.numbers_of_scene`)
 _SCENE = ("bodies", "gravity", "loads", "load_cases")
 #: variables whose bounds are tried all with one another; of more, one after the other
 TOGETHER = 8

@@ -15,7 +15,7 @@ class ReductionKind(NamedTuple):
     of g. One of the following three says what it is of:
     signs: it is the highest peak of sign times g, times that sign: (1,) the largest value, (-1,) the smallest, (1, -1)
     the largest magnitude. power: it follows from the integral over time of this power of g, 1 or 2, by `formula`,
-    module:function, called as `general.integral_reductions.integral` is. at_end: it is the value at the end.
+    module:function, called as `general.responses.integral_reductions.integral` is. at_end: it is the value at the end.
     springs: module:name of its code in the kernels of springs between free bodies; empty where only the kernels of
     general scenes have it.
     """
@@ -64,7 +64,7 @@ class ReductionKind(NamedTuple):
         return self.unit.format(unit=unit)
 
 
-_SPRINGS, _FORMULAS = "mdstopo.sensitivity.reductions", "mdstopo.general.integral_reductions"
+_SPRINGS, _FORMULAS = "mdstopo.sensitivity.reductions", "mdstopo.general.responses.integral_reductions"
 
 #: the reductions by their name
 REDUCTIONS: dict[str, ReductionKind] = {

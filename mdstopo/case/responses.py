@@ -34,7 +34,8 @@ class ResponseKind(Value):
     word: as case files have it; doc: what of what, for the case reference; unit: of its values.
     keys: those that stand beside it, None where the word stands alone; made: the response from its keys, None where
     something is a mistake, which is noted.
-    kernels: where its `ResponseKernels` are (`general.response_kernels`), module:name; empty of an expression.
+    kernels: where its `ResponseKernels` are (`general.responses.response_kernels`), module:name; empty of an
+    expression.
     order: how many derivatives by time it has of a position; is_position: whether it is a place or an angle of a body.
     of_point: whether it is the motion of a point, seen from a body, as a component or a norm.
     depends_on_rate: whether it needs velocities or accelerations; is_energy: whether it is the stored energy.
@@ -146,16 +147,16 @@ def _of_joint(word: str, keys: Fields, _: Frames, __: Reading) -> Response:
 def _point(word: str, unit: str, order: int) -> ResponseKind:
     keys = _AT_POINT if order else with_since(_AT_POINT)
     return ResponseKind(
-        word=word, doc="of a point", unit=unit, kernels="mdstopo.general.general_responses:OF_POINT", keys=keys,
-        made=_at_point,
+        word=word, doc="of a point", unit=unit, kernels="mdstopo.general.responses.general_responses:OF_POINT",
+        keys=keys, made=_at_point,
         order=order, is_position=order == 0, of_point=True, depends_on_rate=order > 0, in_space=word,
     )  # fmt: skip
 
 
 def _angle(word: str, unit: str, order: int) -> ResponseKind:
     return ResponseKind(
-        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.general_responses:OF_ANGLE", keys=_OF_ANGLE,
-        made=_of_angle, order=order, is_position=order == 0, depends_on_rate=order > 0,
+        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.responses.general_responses:OF_ANGLE",
+        keys=_OF_ANGLE, made=_of_angle, order=order, is_position=order == 0, depends_on_rate=order > 0,
         in_space="rotation" if order == 0 else word, is_component=True,
     )  # fmt: skip
 
@@ -220,7 +221,7 @@ RESPONSES: dict[str, ResponseKind] = {
             word="energy",
             doc="stored energy, in J: the sum of alpha^mu V over the design members whose laws act",
             unit="J",
-            kernels="mdstopo.general.general_responses:OF_ENERGY",
+            kernels="mdstopo.general.responses.general_responses:OF_ENERGY",
             depends_on_rate=False,
             is_energy=True,
             in_space="energy",
@@ -235,7 +236,7 @@ RESPONSES: dict[str, ResponseKind] = {
             word="member_force",
             doc="the largest force in a group's members",
             unit="N",
-            kernels="mdstopo.general.general_responses:OF_MEMBERS",
+            kernels="mdstopo.general.responses.general_responses:OF_MEMBERS",
             keys=_OF_GROUP,
             made=_of_group,
             of_members=True,
@@ -245,7 +246,7 @@ RESPONSES: dict[str, ResponseKind] = {
             word="joint_force",
             doc="the force that a joint transmits",
             unit="N",
-            kernels="mdstopo.general.general_responses:OF_JOINT_FORCE",
+            kernels="mdstopo.general.responses.general_responses:OF_JOINT_FORCE",
             keys=_OF_JOINT,
             made=_of_joint,
             in_space="joint_force",
@@ -254,7 +255,7 @@ RESPONSES: dict[str, ResponseKind] = {
             word="joint_moment",
             doc="the couple that a joint transmits",
             unit="N m",
-            kernels="mdstopo.general.general_responses:OF_JOINT_MOMENT",
+            kernels="mdstopo.general.responses.general_responses:OF_JOINT_MOMENT",
             keys=_OF_JOINT,
             made=_of_joint,
             in_space="joint_moment",

@@ -1,6 +1,6 @@
 """The methods of differentiation that a case may name: what is declared of each, one record a method.
 
-What a record names differentiates what a driver of a general scene has found, and stands in `general.methods`.
+What a record names differentiates what a driver of a general scene has found, and stands in `general.driver.methods`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ class SensitivityKind(NamedTuple):
     """What is declared of a method of differentiation: its name, where its code is, and what it can do.
 
     name: as case files have it; doc: a sentence for the case reference. made_by: module:function, called as
-    `general.methods.by_direct` is; empty of a method whose gradients come with the values, from a sweep backwards: the
-    only one that springs between free bodies have in kernels of their own. by_parameters: whether it differentiates by
-    more than alpha: parameters of laws, points, defined names. of_candidates: whether prices of candidates follow from
-    it. of_histories: whether derivatives at every time do. is_exact: whether its gradients are those of the computed
-    values, to rounding. tells_norms: whether it tells how the direction of a norm's vector changes
-    (`evaluation.Peak.across`). steps: the capability that an integrator needs for it
+    `general.driver.methods.by_direct` is; empty of a method whose gradients come with the values, from a sweep
+    backwards: the only one that springs between free bodies have in kernels of their own. by_parameters: whether it
+    differentiates by more than alpha: parameters of laws, points, defined names. of_candidates: whether prices of
+    candidates follow from it. of_histories: whether derivatives at every time do. is_exact: whether its gradients are
+    those of the computed values, to rounding. tells_norms: whether it tells how the direction of a norm's vector
+    changes (`evaluation.Peak.across`). steps: the capability that an integrator needs for it
     (`case.integrators.IntegratorKind`), empty where all will do.
     """
 
@@ -37,7 +37,7 @@ class SensitivityKind(NamedTuple):
         return not self.made_by
 
 
-_HERE = "mdstopo.general.methods"
+_HERE = "mdstopo.general.driver.methods"
 
 #: the methods by their name; the first is that of cases that name none
 SENSITIVITIES: dict[str, SensitivityKind] = {

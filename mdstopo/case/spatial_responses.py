@@ -107,8 +107,8 @@ def _point(word: str) -> ResponseKind:
 
 def _turn(word: str, unit: str, order: int) -> ResponseKind:
     return ResponseKind(
-        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.general_responses:OF_TURN", keys=_OF_TURN,
-        made=_of_turn, order=order, is_position=order == 0, depends_on_rate=order > 0, jumps=order == 0,
+        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.responses.general_responses:OF_TURN",
+        keys=_OF_TURN, made=_of_turn, order=order, is_position=order == 0, depends_on_rate=order > 0, jumps=order == 0,
     )  # fmt: skip
 
 
@@ -127,7 +127,7 @@ SPATIAL_RESPONSES: dict[str, ResponseKind] = {
             word="tilt",
             doc="of an axis of a body",
             unit="rad",
-            kernels="mdstopo.general.general_responses:OF_TILT",
+            kernels="mdstopo.general.responses.general_responses:OF_TILT",
             keys=_OF_TILT,
             made=_of_tilt,
             is_position=True,

@@ -22,7 +22,7 @@ from mdstopo.case.reader import Document
 from mdstopo.case.words import inside
 from mdstopo.engine import Evaluator
 from mdstopo.fit.prepared import LawPlace, case_at, varying
-from mdstopo.general.observed import BALANCE
+from mdstopo.general.driver.observed import BALANCE
 
 EXACT, DIFFERENCES = "exact", "differences"
 #: what the keys of defined names begin with

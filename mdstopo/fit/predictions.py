@@ -14,9 +14,9 @@ from mdstopo.case.measurements import Measured
 from mdstopo.case.model import Case
 from mdstopo.engine import Evaluator
 from mdstopo.fit.numbers import DIFFERENCES, SHIFT_OF_MOTIONS, Numbers
-from mdstopo.general.general_driver import GeneralDriver
-from mdstopo.general.general_model import GeneralModel
-from mdstopo.general.observed import Observed, observe, slopes
+from mdstopo.general.driver.general_driver import GeneralDriver
+from mdstopo.general.driver.observed import Observed, observe, slopes
+from mdstopo.general.model.general_model import GeneralModel
 from mdstopo.status import Status
 
 #: tolerance of motions that are differenced, relative to that of the case, and at most

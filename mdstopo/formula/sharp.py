@@ -1,7 +1,7 @@
 """Where slopes of a formula begin with a root: at `if(x > 0, k*x^1.5, 0)` the slope is as the root of x.
 
 The motion is smooth enough there for steps of any length, but its derivatives by the design are not: beside such a
-switch steps have to be short (`general.adaptive_steps`).
+switch steps have to be short (`general.integrators.adaptive_steps`).
 """
 
 from __future__ import annotations

@@ -4,10 +4,14 @@ Scenes of springs between free bodies whose responses are stored energies have k
 `integrators`, `sensitivity`), which know nothing of what is here. This package computes everything else, and the same
 scenes too, by its own formulas, so that the two families check each other.
 
-    general_model    a scene as arrays      members            all laws, summed over members at one pose
-    forces           all that acts          accelerations      with multipliers, from forces
-    projection       back onto the joints   events             members that switch
-    adaptive_steps, generalized_alpha, gauss                   steps through time
-    step_history     what they leave        general_responses  numbers of a state
-    adjoint, direct  their derivatives      general_driver     what Python calls
+Its folders, from what Python calls down to the arrays; imports point downwards (`.importlinter`):
+
+    driver        evaluates a compiled scene      sensitivity   adjoint, direct, iterative, constant load
+    scene         from a case to arrays           integrators   steps through time, and these linearised
+    pricing       candidates that are not built   events        members that switch
+    statics       before a run begins             design        derivatives by alpha and by values of laws
+    peaks         between steps                   responses     numbers of a state
+                                                  steps         what every method of integration has
+                                                  dynamics      forces, equations of motion, joints
+                                                  model         a scene as arrays
 """

@@ -1,61 +1,30 @@
-"""Bundles of arrays that kernels hand to each other as one pointer.
+"""The types of all structures (`general.model.bundles`), found by name.
 
-A named tuple of thirty arrays is two hundred arguments to the compiler, at every call; a reference to a structure is
-one. Inside kernels a structure is made and read like a named tuple; Python never sees one.
+Numba's disk cache asks this module for them, also in a process that compiles kernels for scenes without any: a kernel's
+cache lists all the types that it was ever compiled for.
 """
 
-from typing import Any
-
-from mdstopo.compiler.kernel import numba, when_compiling
-
-_KINDS: dict[str, type] = {}
-_ENDING = "Structure"
+from mdstopo.compiler.kernel import numba
+from mdstopo.general.model.bundles import ENDING, KINDS
 
 
 def __getattr__(name: str) -> type:
-    """The types of structures, made when something is compiled.
-
-    Numba's disk cache asks this module for them, also in a process that compiles kernels for scenes without any: a
-    kernel's cache lists all the types that it was ever compiled for.
-    """
-    if name.endswith(_ENDING) and name not in _KINDS:
-        from mdstopo.general import (  # noqa: F401 (which have them)
-            accelerations,
-            dense_output,
-            gauss_window,
-            general_model,
-            generalized_alpha_step,
-            priced_candidates,
-            step_history,
-        )
+    """A type of a structure; all of them are made when the first one is asked for that is not made yet."""
+    if name.endswith(ENDING) and name not in KINDS:
+        from mdstopo.general.dynamics import accelerations  # noqa: F401 (this and the following have structures)
+        from mdstopo.general.events import landing  # noqa: F401
+        from mdstopo.general.integrators import gauss_window, generalized_alpha_step  # noqa: F401
+        from mdstopo.general.model import general_model, priced_candidates  # noqa: F401
+        from mdstopo.general.peaks import dense_output  # noqa: F401
+        from mdstopo.general.steps import step_history  # noqa: F401
 
         numba()
     try:
-        return _KINDS[name]
+        return KINDS[name]
     except KeyError:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
 
 
 def __dir__() -> list[str]:
     """The module's own names and the types that are made by now."""
-    return sorted({*globals(), *_KINDS})
-
-
-def bundle(maker: type, fields: tuple[str, ...]) -> None:
-    """Register how `maker(...)` in kernels makes a structure from its fields, in their order; each maker has its own
-    type."""
-
-    @when_compiling
-    def register() -> None:
-        from numba import types
-        from numba.experimental import structref
-
-        def preprocess_fields(self: Any, given: Any) -> Any:
-            """Literal types would make every literal another structure."""
-            return tuple((name, types.unliteral(kind)) for name, kind in given)
-
-        members = {"preprocess_fields": preprocess_fields, "__module__": __name__}
-        kind = type(f"{maker.__name__}{_ENDING}", (types.StructRef,), members)
-        _KINDS[kind.__name__] = kind
-        structref.register(kind)
-        structref.define_constructor(maker, kind, list(fields))
+    return sorted({*globals(), *KINDS})

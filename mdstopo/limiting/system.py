@@ -32,8 +32,8 @@ from mdstopo.case.model import (
     Motion,
     Table,
 )
-from mdstopo.general.drives import drives, motion_times
-from mdstopo.general.planar_scene import PLANE
+from mdstopo.general.scene.drives import drives, motion_times
+from mdstopo.general.scene.planar_scene import PLANE
 from mdstopo.limiting.known import Cubics, Floats, with_second_derivative
 from mdstopo.scene.signal_segments import breakpoints, segment_values
 

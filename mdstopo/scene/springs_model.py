@@ -43,7 +43,7 @@ ROWS = 16
 NO_CHUNK = np.zeros((0, 3), dtype=np.int64)
 
 
-#: fields that both models have, `Model` and `general.general_model.GeneralModel`
+#: fields that both models have, `Model` and `general.model.general_model.GeneralModel`
 StartCoordinates = Annotated[FloatArray, Field("n", "coordinates at the start: moved since home (m, rad)")]
 StartVelocities = Annotated[FloatArray, Field("n", "velocities at the start (m/s, rad/s)")]
 Home = Annotated[FloatArray, Field(f"n // 3, {HOME}", "x, y, psi of each body where its q is zero; cos, sin of psi")]

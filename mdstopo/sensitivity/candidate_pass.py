@@ -1,7 +1,7 @@
 """A pass over the candidates of a group, with any function that prices them: totals, and the best candidates.
 
 Prices are computed by compiled entries that keep a few numbers of each tile of TALL by BROAD points, and those of
-single candidates (`sensitivity.springs_pricing`, `general.general_pricing`).
+single candidates (`sensitivity.springs_pricing`, `general.driver.general_pricing`).
 """
 
 from abc import ABC, abstractmethod

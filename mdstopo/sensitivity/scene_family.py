@@ -1,7 +1,7 @@
 """What the engine asks of a family of kernels: scenes, their drivers, and candidates that are priced.
 
 There are two: springs between free bodies (`sensitivity.springs_driver`), and everything else
-(`general.general_driver`). `scene.family` tells which one a case needs; nothing else asks for it.
+(`general.driver.general_driver`). `scene.family` tells which one a case needs; nothing else asks for it.
 """
 
 from collections.abc import Callable, Mapping, Sequence

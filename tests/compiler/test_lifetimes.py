@@ -7,7 +7,7 @@ import pytest
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.compiler.kernel import Kernel
-from mdstopo.general.structures import bundle
+from mdstopo.general.model.bundles import bundle
 
 
 @kernel

@@ -68,7 +68,7 @@ KERNELS = """
 import math
 
 from mdstopo.compiler.jit import inline, kernel
-from mdstopo.general.response_kernels import ResponseKernels
+from mdstopo.general.responses.response_kernels import ResponseKernels
 from mdstopo.mechanics.laws.law_kernels import LawKernels
 
 

@@ -23,7 +23,7 @@ def test_what_looks_back_at_steps_is_compiled_without_asking_which_steps_serve(m
     def simulate(*_arguments):
         raise AssertionError("the other process would wait for the steps to be compiled")
 
-    monkeypatch.setattr("mdstopo.general.stiffness.held_short", simulate)
+    monkeypatch.setattr("mdstopo.general.driver.stiffness.held_short", simulate)
     evaluator = Evaluator(mdstopo.load_case("restraint"), in_background=False)
     evaluator.compile_responses()
     with pytest.raises(AssertionError, match="would wait"):

@@ -6,7 +6,7 @@ import pytest
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general.extremes import FRACTION, RATE, TIME
+from mdstopo.general.responses.extremes import FRACTION, RATE, TIME
 
 CONES = Rows(cones=True)
 
@@ -267,7 +267,7 @@ def test_how_many_peaks_are_told_and_from_how_far_below_the_highest_is_said_with
         expected = [peak for peak in every if peak.value >= (1.0 - window) * every[0].value][:most]
         assert [peak.value for peak in some] == [peak.value for peak in expected]
         for one, two in zip(some, expected, strict=True):
-            # many rows go back through a step as sums of unit cotangents, few by themselves (`general.row_sweep`)
+            # many rows go back through a step as sums of unit cotangents, few alone (`general.sensitivity.row_sweep`)
             assert one.gradient == pytest.approx(two.gradient, rel=1e-12)
     again = evaluator.evaluate(evaluator.case.start)
     assert [peak.value for peak in again.peaks[name]] == [peak.value for peak in usual.peaks[name]]

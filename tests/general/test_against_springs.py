@@ -9,8 +9,8 @@ import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general.compile_general import compile_general
-from mdstopo.general.general_driver import GENERAL, GeneralDriver
+from mdstopo.general.driver.general_driver import GENERAL, GeneralDriver
+from mdstopo.general.scene.compile_general import compile_general
 from mdstopo.integrators.integrator_choice import method_of
 from mdstopo.integrators.scene_driver import DriverOptions
 from mdstopo.mechanics.laws.spring import NEAR_AT

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdstopo.general.certain_modes import (
+from mdstopo.general.driver.general_pricing import _frames
+from mdstopo.general.pricing.certain_modes import (
     BULGE,
     FASTEST,
     FREE,
@@ -22,7 +23,6 @@ from mdstopo.general.certain_modes import (
     _fill_line,
     _fill_part,
 )
-from mdstopo.general.general_pricing import _frames
 from mdstopo.mechanics.kinematics.kinematics_interface import ALONG, ELONGATION, INVERSE, RATE, WORKS
 from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.kinematics.planar_poses import COS, COS_A, DX, DY, SIN, VT, VX, VY

@@ -105,7 +105,7 @@ def test_steps_are_compiled_for_a_choice_only_where_auto_simulates(
         asked.append(True)
         return ""
 
-    monkeypatch.setattr("mdstopo.general.stiffness.held_short", held_short)
+    monkeypatch.setattr("mdstopo.general.driver.stiffness.held_short", held_short)
     monkeypatch.setattr(Evaluator, "_made", lambda *_: None)
     assert engine.integrator
     assert bool(asked) == simulates

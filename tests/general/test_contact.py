@@ -8,8 +8,8 @@ import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.general.general_contact import add_contacts
-from mdstopo.general.general_model import pack_general, unpack_general
+from mdstopo.general.dynamics.general_contact import add_contacts
+from mdstopo.general.model.general_model import pack_general, unpack_general
 from mdstopo.mechanics.contact import CLOSED
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size, relative_pose
 from mdstopo.status import Status

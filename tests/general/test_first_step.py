@@ -5,11 +5,11 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
-from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.compile_general import compile_general
-from mdstopo.general.first_step import PROBES, first_step
-from mdstopo.general.general_model import pack_general, unpack_general
-from mdstopo.general.runge_kutta import FIRST_ERRORS
+from mdstopo.general.dynamics.accelerations import make_workspace, solve_accelerations
+from mdstopo.general.integrators.runge_kutta import FIRST_ERRORS
+from mdstopo.general.model.general_model import pack_general, unpack_general
+from mdstopo.general.scene.compile_general import compile_general
+from mdstopo.general.steps.first_step import PROBES, first_step
 from mdstopo.integrators.steps import FORCES, TURN, WORK
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from tests.compiled import compiled

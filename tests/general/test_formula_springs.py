@@ -11,7 +11,7 @@ from mdstopo.case.laws.cubic_law import CubicLaw
 from mdstopo.case.laws.spring_law import SpringLaw
 from mdstopo.case.reader import read_case
 from mdstopo.formula.parser import parse
-from mdstopo.general.formula_springs import polynomial, spring_of, with_springs
+from mdstopo.general.scene.formula_springs import polynomial, spring_of, with_springs
 from mdstopo.mechanics.laws import law_table
 from tests.formula.random_formulas import evaluate
 

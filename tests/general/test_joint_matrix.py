@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.general.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace, solve_unknowns
-from mdstopo.general.compile_general import compile_general
-from mdstopo.general.general_model import pack_general, unpack_general
-from mdstopo.general.joint_matrix import decompose, substitute, weakest
-from mdstopo.general.switches import OF_JOINTS, SWITCHES
+from mdstopo.general.dynamics.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace, solve_unknowns
+from mdstopo.general.dynamics.joint_matrix import decompose, substitute, weakest
+from mdstopo.general.model.general_model import pack_general, unpack_general
+from mdstopo.general.model.switches import OF_JOINTS, SWITCHES
+from mdstopo.general.scene.compile_general import compile_general
 from mdstopo.mechanics.kinematics.planar import turn_bodies
 from tests.compiled import compiled
 from tests.space.in_python import in_python  # noqa: F401

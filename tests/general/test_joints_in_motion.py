@@ -124,7 +124,7 @@ def test_a_hanging_chain_keeps_its_energy():
 
 
 def test_the_matrix_of_a_chain_is_banded_whatever_its_length():
-    from mdstopo.general.compile_general import compile_general
+    from mdstopo.general.scene.compile_general import compile_general
 
     widths = []
     for n in (20, 60):

@@ -5,7 +5,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
-from mdstopo.general import step_inside
+from mdstopo.general.steps import step_inside
 from mdstopo.integrators.runge_kutta_tables import GENERAL, VECTORS, A, B, C, runge_kutta_tables
 from tests.engine.test_runge_kutta import residual
 from tests.space.in_python import in_python  # noqa: F401  (a fixture)

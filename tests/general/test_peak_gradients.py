@@ -5,7 +5,7 @@ import pytest
 
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.general.general_driver import GeneralDriver
+from mdstopo.general.driver.general_driver import GeneralDriver
 
 CASE = """
 format: 1

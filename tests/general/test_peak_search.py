@@ -5,8 +5,8 @@ import pytest
 
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general import peak_search
-from mdstopo.general.extremes import COLUMNS, RATE, SAMPLES, SIGN, TIME, VALUE
+from mdstopo.general.peaks import peak_search
+from mdstopo.general.responses.extremes import COLUMNS, RATE, SAMPLES, SIGN, TIME, VALUE
 from tests.general.support import design_of
 from tests.general.test_row_sweep import CASES, IMPLICIT
 from tests.space.in_python import in_python

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mdstopo.general.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace
-from mdstopo.general.general_model import pack_general, unpack_general
-from mdstopo.general.projection import swept
+from mdstopo.general.dynamics.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace
+from mdstopo.general.dynamics.projection import swept
+from mdstopo.general.model.general_model import pack_general, unpack_general
 from mdstopo.mechanics.kinematics.planar import turn_bodies
 from tests.compiled import compiled
 from tests.general.test_joint_matrix import MECHANISM, model_of

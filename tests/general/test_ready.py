@@ -7,8 +7,8 @@ from mdstopo.case.reader import read_case
 from mdstopo.compiler.jit import entry
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general.general_driver import COUNT_AT, TANGENT_AT, WINDOW_AT
-from mdstopo.general.ready import Ready
+from mdstopo.general.driver.general_driver import COUNT_AT, TANGENT_AT, WINDOW_AT
+from mdstopo.general.driver.ready import Ready
 from tests.general.test_esdirk import PENDULUM
 
 

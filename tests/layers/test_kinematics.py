@@ -74,7 +74,7 @@ def code_lines(path: Path) -> Iterator[tuple[int, str]]:
 
 def test_nothing_above_kinematics_has_the_stride_of_a_body() -> None:
     found, used = [], set()
-    for path in sorted(GENERAL.glob("*.py")):
+    for path in sorted(GENERAL.rglob("*.py")):
         if path.name in OF_ONE_DIMENSION:
             continue
         for number, line in code_lines(path):
@@ -115,7 +115,7 @@ def test_other_numbers_are_no_strides(line: str) -> None:
 
 def test_modules_above_kinematics_do_not_ask_the_plane() -> None:
     found: dict[str, set[str]] = {}
-    for path in GENERAL.glob("*.py"):
+    for path in GENERAL.rglob("*.py"):
         named = set(re.findall(r"mechanics\.kinematics\.(planar\w*)", path.read_text(encoding="utf-8")))
         if named:
             found[path.name] = named

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mdstopo.general.general_model import MEMBER_EXCESS
+from mdstopo.general.model.general_model import MEMBER_EXCESS
 from mdstopo.mechanics.kinematics import planar_grids
 from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose

@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from mdstopo.case.reader import read_case
-from mdstopo.general import turning_drives
-from mdstopo.general.compile_general import GeneralScene, compile_general
+from mdstopo.general.scene import turning_drives
+from mdstopo.general.scene.compile_general import GeneralScene, compile_general
 from mdstopo.mechanics.kinematics import spatial_drives
 
 from .in_python import KERNELS, STEP, in_python, same

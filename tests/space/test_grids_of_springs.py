@@ -10,7 +10,7 @@ import pytest
 
 from mdstopo import Evaluation, evaluate
 from mdstopo.case.reader import read_case
-from mdstopo.general import compile_general
+from mdstopo.general.scene import compile_general
 from mdstopo.mechanics.kinematics import spatial_grids
 from mdstopo.mechanics.kinematics.spatial_poses import POSE
 from mdstopo.mechanics.laws.law_table import SPRING

@@ -7,7 +7,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
-from mdstopo.general.general_driver import GeneralDriver
+from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: springs between bodies, to ground and to a body that is moved, with two rows that are pulled back at once
 SCENE = """

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.general.compile_general import GeneralScene, compile_general
-from mdstopo.general.general_model import MEMBER_EXCESS, MEMBER_FREE_LENGTH
+from mdstopo.general.model.general_model import MEMBER_EXCESS, MEMBER_FREE_LENGTH
+from mdstopo.general.scene.compile_general import GeneralScene, compile_general
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.scene.origin import origin_of, seen_from
 
@@ -196,7 +196,7 @@ def test_joints_have_their_points_and_axes() -> None:
 def test_slopes_that_are_said_to_be_steady_are() -> None:
     case, scene = made(HULL + JOINTS)
     model = scene.model
-    from mdstopo.general.spatial_scene import SPACE
+    from mdstopo.general.scene.spatial_scene import SPACE
 
     found = []
     for seed in (1, 2):

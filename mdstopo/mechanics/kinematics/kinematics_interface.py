@@ -35,7 +35,7 @@ WORKS = 4
 
 #: by the name of the model's type
 _MOVED_BY: dict[str, "Kinematics"] = {}
-#: what a structure's type is called beside its maker (`general.structures`)
+#: what a structure's type is called beside its maker (`general.model.bundles`)
 _ENDING = "Structure"
 
 
@@ -924,7 +924,7 @@ def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, 
       p (3 or more,): k, c, preload of the law.
       start, count: the first spring (padded), and how many there are.
       row: of a grid, how many behind each other begin at one point, or minus that; else 0
-      (`general.general_model.ROW`). counted, member_state, r, tangent: as of `member_sums`.
+      (`general.model.general_model.ROW`). counted, member_state, r, tangent: as of `member_sums`.
     Out:
       o (SUMS,): added to.
     """
@@ -1277,7 +1277,7 @@ INTERFACE: dict[str, Callable[..., Any]] = {
 
 
 def move_by(maker: type, kinematics: Kinematics) -> None:
-    """Register the kinematics of the models that `maker` makes in kernels (`general.structures`)."""
+    """Register the kinematics of the models that `maker` makes in kernels (`general.model.bundles`)."""
     _MOVED_BY[maker.__name__] = kinematics
 
 

@@ -2,7 +2,7 @@
 
 A formula may give a driven coordinate, its rate or its acceleration. Of the latter two the coordinate is an integral
 from the start of the segment, by Gauss' quadrature; segments are so short that it is right to rounding
-(`general.driven_integrals`).
+(`general.scene.driven_integrals`).
 """
 
 import numpy as np

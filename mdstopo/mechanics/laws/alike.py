@@ -1,4 +1,4 @@
-"""The spring law over members that share its parameters: what `general.members` does member by member, in vectors.
+"""The spring law over members that share its parameters: what `general.dynamics.members` does one by one, in vectors.
 
 The geometry and the sums are those of `mechanics.laws.spring`, with f = k x + c x' + preload, x = Delta, times
 s = alpha^mu of each member. Arguments: member (6 M,), the rows of `spring` of all members behind each other,

@@ -99,7 +99,7 @@ class LawKernels:
     given.
     modes: of a law that switches. permanent_set: of one that remembers, which switches too.
     linear: the force is p[0] x + p[1] xd + p[2], for which there are vectors over many members.
-    inertial: the force is p[0] d2Delta/dt2: part of the mass (`general.forces`), with no kernel here.
+    inertial: the force is p[0] d2Delta/dt2: part of the mass (`general.dynamics.forces`), with no kernel here.
     signal (record): of a force that is given over time, the table.
     breakpoints (record, fine): times at which steps have to end: kinks, jumps, narrow peaks; fine: see
     `pulse.breakpoints`.

@@ -2,7 +2,7 @@
 
 Codes follow the order of `case.laws.LAWS`; a law of another distribution gets the next one when a scene first has it.
 The branches by code are made by `compiler.choice_by_code`. Linear laws share a code, for they share their vectors; the
-inertial ones are part of the mass (`general.forces`), and their code stands for no kernel.
+inertial ones are part of the mass (`general.dynamics.forces`), and their code stands for no kernel.
 """
 
 import importlib

@@ -1,0 +1,88 @@
+"""Integrals over time of what has kinks: a norm that passes zero, the largest of several forces that changes hands.
+
+A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
+first sampled, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
+derivatives bend more sharply than values; for values see `quadrature_breakpoints`). The
+integrand is continuous there, so that its derivatives need no term of their own. They jump there, and at the end of a
+step beside a norm's zero they belong to a vector that all but vanishes: what the last stages of a long step are off by,
+which is more than the step is, would turn it anywhere. Steps beside a zero are therefore short (`BESIDE`).
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.general.driver.minima import LOW, Pieces
+from mdstopo.general.model.general_model import GeneralModel
+from mdstopo.general.responses.extremes import FRACTION, STEP, VALUE, EvaluateAt
+from mdstopo.general.responses.general_responses import has_kinks, has_norm, is_expression
+from mdstopo.scene.springs_model import FloatArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver.general_driver import GeneralDriver
+
+#: how long the steps beside a norm's zero are, relative to the step that it was found in: the last stage of a step is
+#: off by its length to the sixth power or so
+BESIDE = 0.1
+#: fractions of a step at which values beside a kink are compared, one after the other
+DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
+
+
+def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
+    """Times inside (t[0], t[-1]) at which steps have to end because response j has a kink there; t (m + 1,): the steps'
+    times."""
+    pieces = Pieces(driver, j, t)
+    values, rates = pieces.samples[:, :, 0], pieces.samples[:, :, 1]
+    highest = float(np.abs(values).max())
+    if highest == 0.0:
+        return []
+    found = list(pieces.changes)
+    if not has_kinks(driver.scene.model, j):
+        return found
+    rate = float(np.abs(rates).max())
+    for row in pieces.minima(1e9):
+        low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
+        if low > LOW * highest or not t[0] < row[0] < t[-1]:
+            continue
+        w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.evaluate_at)
+        if min(w + c, len(pieces.t) - 1 - w - c) <= DISTANCES[-1]:  # zero from the start, or to the end: no kink
+            continue
+        time = float(pieces.t[w] + c * (pieces.t[w + 1] - pieces.t[w]))
+        found.append(time)
+        around = _around(time, low, rate, float(t[0]), float(t[-1]))
+        if not around and turns_round(driver.scene.model, j):
+            beside = BESIDE * float(pieces.t[w + 1] - pieces.t[w])
+            around = [each for each in (time - beside, time + beside) if t[0] < each < t[-1]]
+        found += around
+    return found
+
+
+def turns_round(model: GeneralModel, j: int) -> bool:
+    """Whether response j may change its direction sharply near zero: the norm of a vector, or a root in an
+    expression."""
+    return has_norm(model, j) or is_expression(model, j)
+
+
+def _sharpened(w: int, c: float, evaluate_at: EvaluateAt) -> float:
+    """Where in step w a value comes down to zero and goes up again: rates near a kink are smeared, values are not.
+
+    On both sides the value is a line through zero, so that two values tell where.
+    """
+    for d in DISTANCES:
+        if c <= d or c >= 1.0 - d:
+            break
+        left, right = evaluate_at(np.array([[w, c - d], [w, c + d]]), True)[:, 0].tolist()
+        if left + right > 0.0:
+            c += d * (left - right) / (left + right)
+    return min(max(c, 0.0), 1.0)
+
+
+def _around(time: float, low: float, rate: float, start: float, end: float) -> list[float]:
+    """Times about a low value at distances that double, so that steps resolve a bend as sharp as it is low."""
+    if rate <= 0.0 or low <= 1e-9 * rate * (end - start):
+        return []
+    found, width = [], 2.0 * low / rate
+    while width < 0.05 * (end - start):
+        found += [each for each in (time - width, time + width) if start < each < end]
+        width *= 3.0
+    return found

@@ -1,0 +1,187 @@
+"""Where steps are to end for the sake of integrals: at kinks of what is integrated, and where it bends too sharply.
+
+The integral of a response is that of one more coordinate, by the weights of the stages, but no error control measures
+it. A norm or an absolute value has a complex singularity as near to the real axis as it comes to zero, however smooth
+the motion is; the nearer it is, the shorter steps beside it have to be. And a driven body, or one that hardly feels its
+members, takes steps in which a smooth response is no polynomial. So the weights' sum over each step is compared
+with a Gauss-Legendre sum, on the quintic through the step's ends, and steps are halved until both agree. What halves
+them is landed on; since steps are chosen anew in between, that is checked once more. Fixed steps promise nothing, and
+stay.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.general.driver.kinks import kinks
+from mdstopo.general.driver.start import size_of
+from mdstopo.general.responses.general_responses import LISTED, has_kinks, is_expression, switches_of
+from mdstopo.general.steps.step_history import FIRST
+from mdstopo.integrators.gauss_tables import LEVELS
+from mdstopo.integrators.runge_kutta_tables import STAGES
+from mdstopo.scene.springs_model import FloatArray, IndexArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver.general_driver import GeneralDriver
+
+#: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than a method's own weights; than collocation's, too
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+FINE_NODES, FINE_WEIGHTS = np.polynomial.legendre.leggauss(20)
+#: how often an evaluation looks for breakpoints
+ROUNDS = 3
+#: how far both sums over a step may differ, relative to the tolerance and the whole integral: derivatives bend more
+#: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
+#: tolerances). It costs little, because one halving more lowers the difference by hundreds
+SHARE = 1e-3
+#: halvings of one step at most; after PATIENCE of them a step is given up where one more leaves a larger share of the
+#: difference than VAIN: what is left is rounding
+HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
+#: places and angles below this share of the scene's size, or of a radian, are rounding
+NOUGHT = 1e-12
+#: steps nearer together than this share of the simulated time are one
+APART = 1e-10
+
+#: places (K, 2), and between which two ends each is (K,) -> values (K,)
+Integrand = Callable[[FloatArray, IndexArray], FloatArray]
+
+
+def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
+    """Times at which steps are to end, beside `driver.quadrature_breakpoints`, from the `count` steps of its last
+    run."""
+    model, found = driver.scene.model, list[float]()
+    integrals = [(j, kind.is_squared) for j, kind in enumerate(driver.scene.reductions) if kind.is_integral]
+    if not integrals:
+        return found
+    t = driver.states()[0][: count + 1].copy()
+    if not driver.quadrature_breakpoints:
+        for j, _ in integrals:
+            if has_kinks(model, j) or switches_of(model, j):
+                found += kinks(driver, j, t)
+    if not driver.method.kind.adaptive or driver.settings[2] > 0.0:
+        return found
+    ends = np.unique(np.concatenate([t, found, driver.quadrature_breakpoints]))
+    ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]
+    rule = _rule(driver, count)
+    for j, square in integrals:
+        integrand = _integrand(driver, j, t, ends, square)
+        nothing = _rounding(driver, j, float(t[-1] - t[0]))
+        nothing = nothing * nothing if square else nothing
+        found += halves(
+            t,
+            ends,
+            integrand,
+            rule,
+            SHARE * float(driver.settings[0]),
+            nothing * float(t[-1] - t[0]),
+            driver.method.collocates,
+        )
+    return found
+
+
+def _integrand(driver: "GeneralDriver", j: int, t: FloatArray, ends: FloatArray, square: bool) -> Integrand:
+    """Values of response j; those of an expression with switches go on between two `ends` as they are in their middle.
+
+    driver: with a finished run. t (m + 1,): its steps' times (s).
+    ends (k + 1,): where steps end or will have to end (s).
+    square: whether their squares are meant.
+    """
+    count = len(t) - 1
+
+    def sample(places: FloatArray, who: int) -> FloatArray:
+        value: FloatArray = driver.sample_response(j, places, False, count, who=who, rates=False)[2][:, 0]
+        return value * value if square else value
+
+    if not switches_of(driver.scene.model, j):
+        return lambda places, within: sample(places, -1)
+    middle = 0.5 * (ends[:-1] + ends[1:])
+    step = np.clip(np.searchsorted(t, middle, side="right") - 1, 0, count - 1)
+    at = np.column_stack([step, (middle - t[step]) / (t[step + 1] - t[step])])
+    sides = driver.sample_response(j, at, False, count, rates=False)[2][:, 2].astype(np.int64)
+
+    def on_sides(places: FloatArray, within: IndexArray) -> FloatArray:
+        value = np.empty(len(places))
+        for side in np.unique(sides[within]).tolist():
+            own = sides[within] == side
+            value[own] = sample(places[own], side)
+        return value
+
+    return on_sides
+
+
+def _rule(driver: "GeneralDriver", count: int) -> FloatArray:
+    """Nodes and weights (2, s) on (0, 1) by which stages integrate; where steps differ in that, the least of them."""
+    tables, model = driver.method.tables, driver.scene.model
+    if driver.method.collocates:
+        steps = int(driver.limits[1]) + 1
+        first = driver.room_ints[: 4 * steps].reshape(steps, 4)[: count + 1, FIRST]
+        least = int(np.diff(first).min())
+        rule: FloatArray = tables[LEVELS.index(least), 0, :2, :least]
+        return rule
+    method = 1 if model.size[2] != 0 else 0
+    vectors = tables[method, 2, :, : STAGES[method]]
+    weighed = vectors[2] != 0.0
+    return np.stack([vectors[0][weighed], vectors[2][weighed]])
+
+
+def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
+    """What response j may be by rounding alone, where that can be said: what joints hold at zero is never more."""
+    kind, _, _, _, order, _ = driver.scene.model.response[j].tolist()
+    if is_expression(driver.scene.model, j) or LISTED[kind].needs_accelerations:
+        return 0.0
+    kernels = LISTED[kind]
+    of_lengths = kernels.vector is not None and not kernels.vector.is_turn
+    return float(NOUGHT * (size_of(driver.case) if of_lengths else 1.0) / span**order)
+
+
+def halves(
+    t: FloatArray,
+    ends: FloatArray,
+    integrand: Integrand,
+    rule: FloatArray,
+    tolerance: float,
+    nothing: float = 0.0,
+    collocated: bool = False,
+) -> list[float]:
+    """Times that halve the intervals between `ends`, and their halves, until a rule of integration is good on each.
+
+    t (m + 1,): ends of the steps (s), all of them among `ends`.
+    ends (k + 1,): times at which steps end or will have to end (s).
+    integrand: its values (K,) at places (K, 2), steps and fractions of them, each between two ends (K,).
+    rule (2, s): nodes and weights of the rule on (0, 1).
+    tolerance: how far the rule may differ from the Gauss-Legendre sum, relative to the whole integral.
+    nothing: up to this the integral counts as zero, and no interval is halved.
+    collocated: whether the rule is one of Gauss's, which a finer sum has to judge.
+    """
+    count = rule.shape[1]
+    nodes, weights = (FINE_NODES, FINE_WEIGHTS) if collocated else (NODES, WEIGHTS)
+    places = np.concatenate([rule[0], 0.5 * (nodes + 1.0)])
+    low, width, within = ends[:-1], np.diff(ends), np.arange(len(ends) - 1)
+    step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
+    found: list[float] = []
+    whole = np.nan
+    before = np.full(0, np.inf)
+    for depth in range(HALVINGS):
+        times = low[:, None] + width[:, None] * places
+        fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
+        at = np.stack([np.broadcast_to(step[:, None], fraction.shape), fraction], axis=-1)
+        value = integrand(at.reshape(-1, 2), np.repeat(within, len(places))).reshape(fraction.shape)
+        sums = width * np.einsum("ij,j->i", value[:, :count], rule[1])
+        better = 0.5 * width * np.einsum("ij,j->i", value[:, count:], weights)
+        if np.isnan(whole):
+            whole = float(np.abs(better).sum())
+            if whole <= nothing:
+                break
+        off = np.abs(sums - better)
+        bad = (off > tolerance * whole) & (width > 2.0 * APART * (t[-1] - t[0]))
+        if depth >= PATIENCE:  # what does not fall with its halves is rounding
+            pair = off.reshape(2, -1).sum(axis=0)
+            bad &= np.tile(pair <= VAIN * before, 2)
+        if not bad.any():
+            break
+        before = off[bad]
+        half = 0.5 * width[bad]
+        found += (low[bad] + half).tolist()
+        low, width = np.concatenate([low[bad], low[bad] + half]), np.concatenate([half, half])
+        step, within = np.tile(step[bad], 2), np.tile(within[bad], 2)
+    return found

@@ -1,0 +1,260 @@
+"""The static equilibrium near the stated configuration, where a case begins with `settle`.
+
+    F(q, v = 0, t0, alpha, p) - Phi_q^T lam = 0,   Phi(q) = 0
+
+is found by pseudo-dynamics: implicit steps of M q' = F on the joints, whose length grows as long as forces change as
+their stiffness says, until they are Newton's. They run downhill where there is an energy, so a stable equilibrium is
+found, and the nearest in that sense. Forces have kinks (a plateau, a gap), at which a whole step may go too far and the
+next one as far back, for ever: each ends at the latest where no force along it is left. Of an energy whose forces are
+continuous this finds a minimum (J.-S. Pang and L. Qi 1995, "A globally convergent Newton method for convex SC1
+minimization problems"). It depends on the design, alpha and the values p of laws' variables, by
+K dq + Phi_q^T dlam = dF, Phi_q dq = 0: `inverse` is that linear map.
+Every search begins at the stated configuration, whatever was found before.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mdstopo.scene.settled import Settled
+from mdstopo.scene.springs_model import FloatArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver.general_driver import GeneralDriver
+
+#: pseudo-steps at most, and the farthest that one goes, relative to the scene
+MOST, FAR = 400, 0.1
+#: the farthest that an equilibrium is looked for: by how many sizes of the scene a body may move, and how far turn, rad
+SIZES, TURN = 2.0, 2.0 * np.pi
+#: steps grow by this factor where the force along them at their end is off from what was foreseen by at most this share
+#: of that at their start
+GROWTH, AGREES = 4.0, 0.25
+#: how large a force that points back at the end of a step may be, relative to that at its start; and how often at most
+#: a better end is looked for
+BACK, TRIALS = 0.1, 30
+#: how near steps must have come for Newton's to take over, and when these have arrived, relative to the scene
+NEAR, ARRIVED = 1e-6, 1e-13
+#: stiffness, relative to the largest, below which a direction counts as free
+FREE = 1e-9
+
+
+def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:
+    """The equilibrium of alpha (N,) from q0 (n_q,), with the laws as the driver has packed them; or why there is none.
+
+    size: of the scene, m.
+    """
+    bodies = driver.scene.kinematics
+    scene = _AtRest(driver, alpha, size)
+    q = scene.land(q0.copy())
+    rate, left = scene.rate(), scene.left()
+    pace = 1.0 / rate if rate > 0.0 else size / max(float(np.linalg.norm(left)), 1e-300)
+    for _ in range(MOST):
+        step = scene.step(1.0 / pace)
+        far, own = scene.extent(step), scene.scaled(step)
+        ahead = float(own @ left)
+        if far > FAR * size or (ahead < 0.0 and far > ARRIVED * size):
+            pace *= min(max(0.25, 0.5 * FAR * size / far), 0.5)
+            continue
+        q, left, share, off = _stepped(scene, q, step, ahead, float(own @ own) / pace)
+        if off <= AGREES * ahead:
+            pace *= GROWTH
+        elif off > ahead:
+            pace *= 0.5
+        gone = bodies.difference(q, q0)
+        if scene.lost(gone):
+            return _nowhere(driver, gone, scene.arms)
+        if share * far <= NEAR * size and pace * scene.rate() > 1.0:
+            break
+    far = np.inf
+    for _ in range(20):
+        inverse = scene.inverse()
+        step = scene.onto() + inverse @ scene.force
+        before, far = far, scene.extent(step)
+        if not far < 1e-3 * size:
+            break
+        q = bodies.retract(q, step)
+        scene.at(q)
+        if far <= ARRIVED * size or far >= 0.5 * before:
+            break
+    inverse = scene.inverse()
+    if not far <= 1e-9 * size or scene.pushed():
+        return _nowhere(driver, bodies.difference(q, q0), scene.arms)
+    turning = scene.turns_freely()
+    if turning >= 0:
+        return f"body {driver.scene.bodies[turning]} is free to turn, so that its equilibrium is not determined"
+    shift, turn = bodies.shifts_and_turns(bodies.difference(q, q0))
+    distance, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
+    names = driver.scene.bodies
+    far_body, turned_body = int(distance.argmax()), int(angle.argmax())
+    return Settled(
+        q, inverse, float(distance[far_body]), names[far_body], float(angle[turned_body]), names[turned_body]
+    )
+
+
+def _stepped(
+    scene: "_AtRest", q: FloatArray, step: FloatArray, ahead: float, foreseen: float
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Go along a step (n,) from q (n_q,), as far as the force along it does not point back: ahead at its start.
+
+    Where it points back at the start, the step is one of rounding, and is taken as it is.
+
+    Returns where it ends, what is left of the force there, the share of the step taken, and by how much the force along
+    it at the end of all of it differs from what was foreseen.
+    """
+    own = scene.scaled(step)
+    low, high, share, off = 0.0, 1.0, 1.0, 0.0
+    forward, backward = ahead, 0.0
+    for look in range(TRIALS):
+        there = scene.land(scene.bodies.retract(q, share * step))
+        left = scene.left()
+        along = float(own @ left)
+        if look == 0:
+            off = abs(along - foreseen)
+        if ahead <= 0.0 or (along >= -BACK * ahead and (look == 0 or along <= BACK * ahead)):
+            break
+        # Illinois' rule: an end that stays counts half
+        if along > 0.0:
+            low, forward, backward = share, along, 0.5 * backward
+        else:
+            high, forward, backward = share, 0.5 * forward if look else forward, along
+        share = low + (high - low) * min(max(forward / (forward - backward), 0.1), 0.9)
+    return there, left, share, off
+
+
+def _nowhere(driver: "GeneralDriver", shift: FloatArray, arms: FloatArray) -> str:
+    """Why there is no equilibrium: the body that has moved most by a shift (n,), with angles times arms (n,)."""
+    far = np.abs(shift * arms).reshape(-1, driver.scene.kinematics.freedoms).max(axis=1)
+    body = driver.scene.bodies[int(far.argmax())]
+    return f"body {body} finds no static equilibrium near its stated place"
+
+
+class _AtRest:
+    """Forces and stiffness at one configuration, in coordinates scaled by the roots of masses: u = M^(1/2) q."""
+
+    def __init__(self, driver: "GeneralDriver", alpha: FloatArray, size: float) -> None:
+        model = driver.scene.model
+        n, n_row = len(model.mass), int(model.size[0])
+        self._driver, self._alpha, self._size = driver, alpha, size
+        self.free = np.flatnonzero(model.free)
+        self.bodies = driver.scene.kinematics
+        self.arms = np.ones(n)
+        self.bodies.shifts_and_turns(self.arms)[1][:] = size
+        self._root = np.sqrt(model.mass[self.free])
+        self._lam = np.zeros(n_row)
+        self.force, self._dense = np.zeros(n), np.zeros((n, n))
+        self._rows, self._phi = np.zeros((n_row, n)), np.zeros(n_row)
+
+    def at(self, q: FloatArray) -> None:
+        """Look at q (n_q,), whose driven part is put in place."""
+        from mdstopo.general.statics.settle_entry import statics
+
+        d = self._driver
+        statics(
+            d.ints, d.floats, self._alpha, d.member_state, q, self._lam, self.force, self._dense, self._rows, self._phi
+        )
+        root = self._root
+        self.stiffness = self._dense[np.ix_(self.free, self.free)] / root[:, None] / root
+        self.pull = self.force[self.free] / root
+        self.jac = self._rows[:, self.free] / root
+
+    def rate(self) -> float:
+        """Largest stiffness by mass: square of the angular frequency of the fastest motion (1/s^2)."""
+        return float(np.linalg.norm(self.stiffness, 2)) if len(self.free) else 0.0
+
+    def land(self, q: FloatArray) -> FloatArray:
+        """Look at the nearest place on the joints to q (n_q,), which is returned."""
+        self.at(q)
+        for _ in range(3):
+            if np.abs(self._phi).max(initial=0.0) <= ARRIVED * self._size:
+                break
+            q = self.bodies.retract(q, self.onto())
+            self.at(q)
+        return q
+
+    def left(self) -> FloatArray:
+        """What no joint takes of the force (sqrt(kg) m/s^2), in scaled coordinates; multipliers are set to what they
+        take."""
+        if not len(self._lam):
+            return self.pull
+        self._lam[:] = np.linalg.lstsq(self.jac.T, self.pull, rcond=None)[0]
+        left: FloatArray = self.pull - self.jac.T @ self._lam
+        return left
+
+    def scaled(self, step: FloatArray) -> FloatArray:
+        """The free part of a step (n,) in scaled coordinates."""
+        own: FloatArray = step[self.free] * self._root
+        return own
+
+    def step(self, drag: float) -> FloatArray:
+        """(n,): one implicit step with drag M (1/s^2); the joints' multipliers are those of its end."""
+        m, r = len(self.free), len(self._lam)
+        whole = np.zeros((m + r, m + r))
+        whole[:m, :m] = self.stiffness + drag * np.eye(m)
+        whole[:m, m:], whole[m:, :m] = self.jac.T, self.jac
+        both = np.linalg.lstsq(whole, np.concatenate([self.pull, -self._phi]), rcond=1e-15)[0]
+        self._lam[:] = both[m:]
+        return self._wide(both[:m])
+
+    def onto(self) -> FloatArray:
+        """(n,): back onto the joints, by the shortest way."""
+        if not len(self._phi):
+            return np.zeros(len(self.force))
+        return self._wide(np.linalg.lstsq(self.jac, -self._phi, rcond=None)[0])
+
+    def inverse(self) -> FloatArray:
+        """(n, n): dq = inverse dF at fixed joints; directions that nothing holds stay."""
+        if len(self._lam):
+            self._lam[:] = np.linalg.lstsq(self.jac.T, self.pull, rcond=None)[0]
+        basis = self._basis()
+        out = np.zeros((len(self.force), len(self.force)))
+        reduced = basis.T @ self.stiffness @ basis
+        root = self._root
+        inner = basis @ np.linalg.pinv(reduced, rcond=FREE) @ basis.T / root[:, None] / root
+        out[np.ix_(self.free, self.free)] = inner
+        return out
+
+    def pushed(self) -> bool:
+        """Whether a force acts where nothing holds against it."""
+        modes = self._null()
+        scale = self.rate() * self._size * float(self._root.max(initial=0.0))
+        return bool(modes.size) and float(np.abs(modes.T @ self.pull).max()) > FREE * scale
+
+    def turns_freely(self) -> int:
+        """A body that turns in a direction that nothing holds, or -1."""
+        modes = np.abs(self._null() / self._root[:, None]) * self.arms[self.free][:, None]
+        each = self.bodies.freedoms
+        angle = self.free % each >= each - self.bodies.rotations
+        if not modes.size or modes[angle].max(initial=0.0) <= 1e-6 * modes.max():
+            return -1
+        return int(self.free[angle][int(modes[angle].max(axis=1).argmax())]) // each
+
+    def extent(self, step: FloatArray) -> float:
+        """How far a step (n,) goes: the largest shift of a centre, or angle times the scene's size, m."""
+        return float(np.abs(step * self.arms).max(initial=0.0))
+
+    def lost(self, shift: FloatArray) -> bool:
+        """Whether a shift (n,) from the stated place is too large for an equilibrium near it."""
+        far, turned = (np.abs(part).max(initial=0.0) for part in self.bodies.shifts_and_turns(shift))
+        return bool(far > SIZES * self._size or turned > TURN)
+
+    def _basis(self) -> FloatArray:
+        """Directions that the joints allow (columns), of length 1 by mass."""
+        if not len(self._lam):
+            return np.eye(len(self.free))
+        _, sizes, all_rows = np.linalg.svd(self.jac)
+        rank = int(np.sum(sizes > FREE * sizes.max(initial=0.0)))
+        basis: FloatArray = all_rows[rank:].T
+        return basis
+
+    def _null(self) -> FloatArray:
+        """Directions (columns) that neither joints nor stiffness hold."""
+        basis = self._basis()
+        _, sizes, all_rows = np.linalg.svd(basis.T @ self.stiffness @ basis)
+        null: FloatArray = basis @ all_rows[sizes <= FREE * sizes.max(initial=0.0)].T
+        return null
+
+    def _wide(self, u: Any) -> FloatArray:
+        """A step of all coordinates (n,), from that of the free ones in scaled coordinates; zero for the others."""
+        wide = np.zeros(len(self.force))
+        wide[self.free] = u / self._root
+        return wide

@@ -1,0 +1,1 @@
+"""Forces of members, contacts and loads, equations of motion with joints, and the way back onto the joints."""

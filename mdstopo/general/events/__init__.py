@@ -1,0 +1,1 @@
+"""Events: found, located, landed on; permanent sets of members, which they change."""

@@ -1,0 +1,1 @@
+"""The methods of integration: their steps, and these linearised, forwards and backwards."""

@@ -1,0 +1,359 @@
+"""Generalized-alpha steps of a general scene, fixed, with joints and events (Arnold and Bruels' form).
+
+    (1 - alpha_m) x' + alpha_m x = (1 - alpha_f) a' + alpha_f a
+    q* = q + h v + h^2 ((1/2 - beta) x + beta x'),  v* = v + h ((1 - gamma) x + gamma x'),  a' = a(q*, v*, t')
+
+as in `integrators.springs_generalized_alpha`, with a(q, v, t) from the balance with its joints: accelerations and
+multipliers are of second order like the motion. Then q*, v* are moved onto the joints (`projection`) by what they are
+off, which is of third order: no drift, and no transient at the start, because x begins where it belongs. Newton's
+iteration takes the exact tangent of the whole balance. A step that a switching member's margin does not survive ends at
+the event; what is left of the segment is divided anew. Steps do not end at the knots of curves: where the second
+derivative of a force jumps, a method of second order loses nothing, and steps that stay as they are have derivatives
+that are exact.
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import entry
+from mdstopo.general.dynamics.accelerations import make_workspace, solve_accelerations
+from mdstopo.general.dynamics.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
+from mdstopo.general.events.event_log import CHATTER, log_at_breakpoint, log_switches
+from mdstopo.general.events.events import first_sign, has_switches, room_for_watched, smallest_margin, watch_all
+from mdstopo.general.events.locate import (
+    CUTS,
+    TRIALS,
+    cut_at,
+    foreseen_trial,
+    matters,
+    narrowed,
+    next_trial,
+    note_trial,
+    quintic_ends,
+)
+from mdstopo.general.events.permanent_sets import begins_divided
+from mdstopo.general.integrators.generalized_alpha_step import AUXILIARY, VELOCITY, advance, make_step_room, rate_of
+from mdstopo.general.model.general_model import unpack_general
+from mdstopo.general.steps.run_start import ROUNDING, log_start, motion_at_start, scene_size, start_modes
+from mdstopo.general.steps.step_history import (
+    EVENTS,
+    FIRST,
+    PARENT,
+    SEGMENT,
+    carve_history,
+    copy_vector,
+    keep_state,
+)
+from mdstopo.integrators.springs_generalized_alpha import FEWEST
+from mdstopo.integrators.steps import (
+    ACCEPTED,
+    CHATTERING,
+    FORCES,
+    NEEDS_ROOM,
+    NON_FINITE,
+    OK,
+    SINGULAR,
+    STEP_LIMIT,
+    STEP_TOO_SMALL,
+)
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    deflection,
+    drive_state,
+    pose_size,
+    relative_pose,
+)
+from mdstopo.mechanics.kinematics.planar_poses import copy_rows
+
+TAG = (0, 0)
+
+
+@entry
+def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, member_state, work, where):
+    """Integrate a design over `model.times` in fixed steps.
+
+    Constant:
+      ints, floats: the packed scene (`general_model.pack_general`).
+      tables (1,): the spectral radius.
+      alpha (N,): the design.
+      tangent: not read; tangents are always kept.
+      settings: tolerance of the case, relative (it tells which touches count as doubtful); Newton tolerance, relative
+        to the motion; the step (s), or, where negative, so many radians of the fastest vibration at the start.
+      limits: steps allowed, and the sizes of the arrays (`carve_history`).
+    Out:
+      room, room_ints: the history of steps, as of `carve_history`.
+      member_state (3, columns): state of the members; scales are set from alpha, modes and sets are those at the end.
+      work (WORK,): counts of work, added to.
+      where (3,): each -1 where there is none: the member or the unknown that is to blame for an early end; a member
+        whose ends have met; one that grazes so that the motion has no derivative.
+
+    Returns code (`integrators.steps`; NEEDS_ROOM: the arrays are too small), number of steps, number of events, time
+    reached (s).
+    """
+    model = unpack_general(ints, floats)
+    newton_tolerance = settings[1]
+    n_q = model.q0.shape[0]
+    n = model.v0.shape[0]
+    n_pair = model.pair.shape[0]
+    n_row = model.size[0]
+    history = carve_history(model, limits, room, room_ints)
+    history.mass[0] = 0.0
+    scale_general(model.block, model.power, alpha, member_state)
+    member_state[MODE] = 0.0
+    member_state[SET] = 0.0
+    times = model.times
+    workspace = make_workspace(model)
+    no = np.bool_(False)
+    size = scene_size(model)
+    rounding = ROUNDING * size
+    nowhere = np.int64(-1)
+    rel = np.empty((n_pair, pose_size(model)))
+    rel0 = np.empty((n_pair, pose_size(model)))
+    before = np.empty((n_pair, pose_size(model)))
+    q = np.zeros(n_q)
+    state = np.zeros((3, n))
+    end_q = np.zeros(n_q)
+    ends = np.zeros((3, n))
+    guess = np.zeros((3, n))
+    trial_q = np.zeros(n_q)
+    trial = np.zeros((3, n))
+    trials = np.zeros((2, 2))
+    curve_q = np.empty((2, n_q))
+    curve = np.empty((2, 2, n))
+    cut = np.empty(CUTS + 1)
+    beyond_q = np.zeros((CUTS + 1, n_q))
+    beyond = np.zeros((CUTS + 1, 3, n))
+    left_q = np.zeros(n_q)
+    left_v = np.zeros(n)
+    kept = np.zeros((3, n))
+    push = np.zeros((2, n_row))
+    lam = np.zeros(n_row)
+    a0 = np.zeros(n)
+    v = state[VELOCITY]
+    copy_vector(model.q0, q)
+    copy_vector(model.v0, v)
+    for i in range(where.shape[0]):
+        where[i] = -1
+    graze = settings[0] * size
+    t = times[0]
+    drive_state(model, np.int64(0), t, q, v)
+    switching = has_switches(model, no)
+    watched = room_for_watched(model)
+    watch_all(model, np.int64(0), watched)
+    if switching:
+        singular = start_modes(model, member_state, workspace, q, v, a0, lam, no)
+        if singular >= 0:
+            where[0] = singular
+            return SINGULAR, 0, 0, t
+        if model.varied.shape[0] > 0:
+            where[2] = begins_divided(model, member_state, q, v, graze)
+    singular = solve_accelerations(model, member_state, np.int64(0), t, q, v, np.bool_(True), workspace, a0, lam)
+    if singular >= 0:
+        where[0] = singular
+        return SINGULAR, 0, 0, t
+    relative_pose(model, q, v, rel0)
+    extent = np.zeros((2, n_pair))
+    motion = extent[0]
+    noise = extent[1]
+    stiffness = np.empty(n_pair)
+    motion_at_start(model, member_state, workspace, rel0, v, stiffness, motion, noise)
+    shortest = np.empty(n_pair)
+    shortest_at_start(model, rel0, shortest)
+    span = times[times.shape[0] - 1] - t
+    step_room = make_step_room(model)
+    step = settings[2]
+    if not step > 0.0:
+        rate = rate_of(model, workspace)
+        step = min(-step / rate, span / FEWEST) if rate > 0.0 else span / FEWEST
+    events = log_start(member_state, history) if switching else np.int64(0)
+    if events < 0:
+        return NEEDS_ROOM, 0, 0, t
+    keep_state(history, 0, t, q, v, push[0], push[1])
+    history.index[0, FIRST] = 0
+    count = np.int64(0)
+    stages = np.int64(0)
+    crowd_time = t
+    crowd = 0
+    for segment in range(times.shape[0] - 1):
+        end = times[segment + 1]
+        if segment > 0:
+            drive_state(model, segment, t, q, v)
+            keep_state(history, count, t, q, v, history.push[count, 0], history.push[count, 1])
+            if switching:
+                events = log_at_breakpoint(
+                    model, member_state, segment, t, q, v, watched, workspace, a0, lam, history, count, events,
+                    rounding, work, where,
+                )  # fmt: skip
+                if events < 0:
+                    return NEEDS_ROOM, count, 0, t
+        begin = t
+        pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
+        done = 0.0
+        known = 0
+        while t < end:
+            h = (end - begin) / pieces
+            if not count + pieces - done <= limits[0]:
+                return STEP_LIMIT, count, events, t
+            if count + 3 > history.t.shape[0] or stages + 3 > history.when.shape[0]:
+                return NEEDS_ROOM, count, events, t
+            if not h > 1e-15 * max(abs(begin), abs(end)):
+                return STEP_TOO_SMALL, count, events, t
+            lands = done + 1.0 >= pieces
+            starting = np.bool_(known == 0)
+            code, used, singular = advance(
+                model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance, size,
+                stages, workspace, history, end_q, ends, push, extent, rel0, step_room, work,
+            )  # fmt: skip
+            if code != OK:
+                where[0] = singular
+                return code, count, events, t
+            relative_pose(model, end_q, ends[VELOCITY], rel)
+            happens = False
+            who = nowhere
+            if switching:
+                margin, who = smallest_margin(model, t + h, member_state, rel, watched)
+                low = 0.0
+                high = h
+                top = 0
+                cuts = 0
+                cut[0] = h
+                copy_vector(end_q, beyond_q[0])
+                copy_rows(ends, beyond[0])
+                copy_vector(q, left_q)
+                copy_vector(v, left_v)
+                while top >= 0:  # as `landing.first_piece` does
+                    relative_pose(model, left_q, left_v, before)
+                    relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
+                    dip, near = first_sign(
+                        model, t + low, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY], before,
+                        rel, cut[top] - low, rounding, watched,
+                    )  # fmt: skip
+                    middle = cut_at(dip, near, low, cut[top])
+                    if middle < 0.0 or cuts == CUTS:
+                        if top == 0 and margin < -rounding:
+                            break
+                        low = cut[top]
+                        copy_vector(beyond_q[top], left_q)
+                        copy_vector(beyond[top, VELOCITY], left_v)
+                        top -= 1
+                        continue
+                    cuts += 1
+                    top += 1
+                    cut[top] = middle
+                    copy_rows(state, kept)
+                    code, _, singular = advance(
+                        model, tables[0], member_state, segment, t, middle, starting, q, kept, guess, newton_tolerance,
+                        size, nowhere, workspace, history, beyond_q[top], beyond[top], push, extent, rel0,
+                        step_room, work,
+                    )  # fmt: skip
+                    if code != OK:
+                        where[0] = singular
+                        return code, count, events, t
+                    relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
+                    value, near_who = smallest_margin(model, t + middle, member_state, rel, watched)
+                    if value < -rounding:
+                        high = middle
+                        margin = value
+                        who = near_who
+                        break
+                    if value < graze and matters(model, t + middle, member_state, rel, near_who):
+                        where[2] = near_who
+                relative_pose(model, left_q, left_v, before)
+                happens = margin < -rounding
+                if happens:
+                    at_low, _ = smallest_margin(model, t + low, member_state, before, watched)
+                    at_low = max(at_low, rounding)
+                    at_high = margin
+                    side = 0
+                    piece = low
+                    stop = high
+                    quintic_ends(
+                        model, member_state, segment, t, piece, stop, left_q, left_v, beyond_q[top],
+                        beyond[top, VELOCITY], workspace, lam, curve_q, curve,
+                    )  # fmt: skip
+                    work[FORCES] += 2
+                    for tries in range(TRIALS):
+                        foreseen = foreseen_trial(
+                            model, member_state, segment, t, piece, stop, curve_q, curve, trials, tries, rounding,
+                            watched, trial_q, trial[VELOCITY], rel,
+                        )  # fmt: skip
+                        middle = next_trial(low, high, at_low, at_high, foreseen, rounding, 4e-16 * (abs(t) + h), tries)
+                        if middle < 0.0:
+                            break
+                        copy_rows(state, kept)
+                        code, _, singular = advance(
+                            model, tables[0], member_state, segment, t, middle, starting, q, kept, guess,
+                            newton_tolerance, size, nowhere, workspace, history, trial_q, trial, push, extent,
+                            rel0, step_room, work,
+                        )  # fmt: skip
+                        if code != OK:
+                            where[0] = singular
+                            return code, count, events, t
+                        relative_pose(model, trial_q, trial[VELOCITY], rel)
+                        value, who = smallest_margin(model, t + middle, member_state, rel, watched)
+                        note_trial(trials, middle, value)
+                        low, high, at_low, at_high, side = narrowed(
+                            low, high, at_low, at_high, middle, value, rounding, side
+                        )
+                    h = high
+                    lands = lands and t + h >= end
+                    code, used, singular = advance(
+                        model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance,
+                        size, stages, workspace, history, end_q, ends, push, extent, rel0, step_room, work,
+                    )  # fmt: skip
+                relative_pose(model, end_q, ends[VELOCITY], rel)
+            finite = True
+            for d in range(n_q):
+                finite = finite and np.isfinite(end_q[d])
+            for d in range(n):
+                finite = finite and np.isfinite(ends[VELOCITY, d])
+            if not finite:
+                return NON_FINITE, count, events, t
+            for p in range(n_pair):
+                motion[p] = max(motion[p], deflection(model, rel, rel0, p))
+            if where[1] < 0 and may_meet(shortest, motion):
+                relative_pose(model, q, v, before)
+                where[1] = meeting(model, segment, t, member_state, before, rel)
+            done += 1.0
+            known += 1
+            t = end if lands else (t + h if happens else begin + h * done)
+            # x of the steps before; in the first ones it counts as having been constant
+            for d in range(n):
+                guess[2, d] = guess[1, d]
+                guess[1, d] = guess[0, d]
+                guess[0, d] = state[AUXILIARY, d]
+            if known <= 3:
+                for d in range(n):
+                    slope = ends[AUXILIARY, d] - state[AUXILIARY, d]
+                    guess[0, d] = ends[AUXILIARY, d] - slope
+                    guess[1, d] = ends[AUXILIARY, d] - 2.0 * slope
+                    guess[2, d] = ends[AUXILIARY, d] - 3.0 * slope
+            copy_vector(end_q, q)
+            copy_rows(ends, state)
+            history.index[count, PARENT] = count - 1
+            history.index[count, SEGMENT] = segment
+            history.index[count, EVENTS] = events
+            stages += used
+            count += 1
+            history.index[count, FIRST] = stages
+            keep_state(history, count, t, q, v, push[0], push[1])
+            work[ACCEPTED] += 1
+            if happens:
+                solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a0, lam)
+                events = log_switches(
+                    model, member_state, segment, t, q, v, watched, workspace, a0, lam, history, count, events, graze,
+                    rounding, work, where,
+                )  # fmt: skip
+                if events < 0:
+                    return NEEDS_ROOM, count, 0, t
+                crowd = crowd + 1 if t - crowd_time < 1e-6 * span else 0
+                if crowd == 0:
+                    crowd_time = t
+                if crowd > CHATTER:
+                    where[0] = who
+                    return CHATTERING, count, events, t
+                begin = t
+                done = 0.0
+                known = 0
+                pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
+            history.index[count, EVENTS] = events
+    history.index[count + 1, FIRST] = stages  # no step follows (`weights_of`)
+    return OK, count, events, t

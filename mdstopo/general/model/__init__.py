@@ -1,0 +1,1 @@
+"""The arrays of a compiled scene as kernels know them: fields, columns with names, structures, places of unknowns."""

@@ -1,0 +1,421 @@
+"""In which mode all members of a part of a tile are, from bounds of what any of them does.
+
+The first points of a tile, and the second ones of each of its parts, lie near lines: at m + s h, -1 <= s <= 1, and no
+further than a bulge beside it. With the vector d = d_0 + S q - p between the ends at a relative pose, of length L and
+direction e in the middle of both lines, any other vector d + w has the length
+
+    L + e . w <= |d + w| <= L + e . w + |w_across|^2 / (2 (L - |w|)),
+
+and its direction differs from e + w_across / L by less than 0.6 |w|^2 / (L - |w|)^2 (half the second derivative of
+d / |d|, which is at most 2 / sqrt(3)), and from e by |w| / (L - |w|) at most. The rate of its length is that direction
+times its velocity, which is v = d_0' + S' q in the middle, and v + S' h where the second point is off by h. With a
+reach r that neither |w| nor |h| exceeds, the rate is
+
+    e . v + e . S' h + w_across . v / L    +- (0.6 |v| r^2 / (L - r)^2 + |S'| r^2 / (L - r)).
+
+What is linear in the s of both points is largest where these are 1 or -1. A bulge b adds b to the length, and
+b (|v| / L + |S'|) to the rate. So elongations and rates have bounds whose width beyond the linear part falls with the
+square of the part. Bounds of a margin follow where it is the least of linear functions: at the corners.
+"""
+
+import math
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.general.model.priced_candidates import (
+    CODE,
+    FIRST_NODE,
+    FIRST_STAGE,
+    FIRST_STATE,
+    FIRST_STEP,
+    FOLLOWED,
+    KIND,
+    MODES,
+    NODE,
+    NODES,
+    POINT,
+    SCENE,
+)
+from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, rotations
+from mdstopo.mechanics.laws.law_table import (
+    law_first_set,
+    law_makes_set,
+    law_margin,
+    law_margin_slopes,
+    law_next,
+    law_remembers,
+    law_start,
+)
+from mdstopo.sensitivity.tile_interpolation import BROAD, LEVELS, TALL
+
+#: how often a tile is halved for bounds, and one more; columns of the smallest parts
+BOUND_LEVELS = LEVELS + 2
+NARROW = BROAD >> (BOUND_LEVELS - 1)
+#: parts of a tile of all levels, of which those of a level begin at 2^level - 1; the place of its rows behind them
+BOUND_PARTS = 2**BOUND_LEVELS - 1
+ROWS_OF_ALL = BOUND_PARTS
+#: points in body frames, and where their case has them; the middle of their line, and half of it
+LOCAL, STATED = range(2)
+MIDDLE, HALF = range(2)
+#: of a part: the free length in the middle; by how much it changes along the second and the first points; by how much
+#: it may be longer than that; how far its vectors differ from that in the middle, and how far points are from lines (m)
+PART_NUMBERS = 6
+FREE, FREE_SECOND, FREE_FIRST, FREE_MORE, REACH, BULGE = range(PART_NUMBERS)
+#: bounds of elongations and rates
+LOW, HIGH, SLOWEST, FASTEST = range(4)
+#: bounds are so much wider, relative to lengths and speeds, than they need be: no member is at a switch by rounding
+WIDER = 1e-11
+#: what may be known of the modes of all members of a part in a step: nothing; a mode of which none leaves (0 and more);
+#: or that all leave it (-2 less its number), between the same two nodes and for the same one
+UNSURE = -1
+LEAVES = -2
+
+
+@kernel
+def make_spans(axes):
+    """Lines (parts and rows, LOCAL or STATED, MIDDLE or HALF, axes), numbers of parts, vectors, bounds: scratch."""
+    return (
+        np.zeros((BOUND_PARTS + 1, 2, 2, axes)),
+        np.zeros((BOUND_PARTS, PART_NUMBERS)),
+        np.zeros((4, axes)),
+        np.zeros(4),
+    )
+
+
+@kernel
+def fill_spans(candidates, k, i, j, spans):
+    """The lines of a tile's points, and what all bounds of its parts need.
+
+    In:
+      candidates, k: a `PricedCandidates`, and the number of the run.
+      i, j: the tile.
+    Out:
+      spans: of `make_spans`.
+    """
+    line, number, w, _ = spans
+    scene = candidates.run[k, SCENE]
+    grids = (candidates.first[scene], candidates.first_stated[scene])
+    others = (candidates.second[scene], candidates.second_stated[scene])
+    height = min(TALL, grids[0].shape[1] - i * TALL)
+    width = min(BROAD, others[0].shape[1] - j * BROAD)
+    bulge = 0.0
+    for which in range(2):
+        bulge = max(bulge, _fill_line(grids[which], i * TALL, height, line[ROWS_OF_ALL, which]))
+    for level in range(BOUND_LEVELS):
+        size = BROAD >> level
+        for at in range(1 << level):
+            if (at + 1) * size > width:
+                break
+            own = line[(1 << level) - 1 + at]
+            off = 0.0
+            for which in range(2):
+                off = max(off, _fill_line(others[which], j * BROAD + at * size, size, own[which]))
+            _fill_part(candidates.rest[k], own, line[ROWS_OF_ALL], bulge + off, number[(1 << level) - 1 + at], w)
+
+
+@kernel
+def _fill_line(points, first, size, line):
+    """The line of some points.
+
+    In:
+      points (axes, n): of a grid.
+      first, size: number of the first one, and how many there are.
+    Out:
+      line (2, axes): its middle and its half.
+
+    Returns how far points are from it at most (m).
+    """
+    square = 0.0
+    for d in range(points.shape[0]):
+        line[MIDDLE, d] = 0.5 * (points[d, first] + points[d, first + size - 1])
+        line[HALF, d] = 0.5 * (points[d, first + size - 1] - points[d, first])
+        square += line[HALF, d] * line[HALF, d]
+    worst = 0.0
+    for n in range(first, first + size):
+        along = 0.0
+        for d in range(points.shape[0]):
+            along += (points[d, n] - line[MIDDLE, d]) * line[HALF, d]
+        along = min(max(along / square, -1.0), 1.0) if square > 0.0 else 0.0
+        off = 0.0
+        for d in range(points.shape[0]):
+            off += (points[d, n] - line[MIDDLE, d] - along * line[HALF, d]) ** 2
+        worst = max(worst, off)
+    return math.sqrt(worst)
+
+
+@kernel
+def _fill_part(rest, line, rows, bulge, number, w):
+    """What all bounds of a part need.
+
+    In:
+      rest: the free length of all members (m); negative: the distance of their ends as stated.
+      line, rows (2, 2, axes): of the second points and of the first.
+      bulge: how far points are from these at most, together (m).
+    Out:
+      number (PART_NUMBERS,): set.
+      w (4, axes): scratch.
+    """
+    second = 0.0
+    first = 0.0
+    square = 0.0
+    for d in range(line.shape[2]):
+        w[0, d] = line[STATED, MIDDLE, d] - rows[STATED, MIDDLE, d]
+        square += w[0, d] * w[0, d]
+        second += line[STATED, HALF, d] ** 2
+        first += rows[STATED, HALF, d] ** 2
+    number[REACH] = math.sqrt(second) + math.sqrt(first) + bulge
+    number[BULGE] = bulge
+    number[FREE] = rest
+    number[FREE_SECOND] = 0.0
+    number[FREE_FIRST] = 0.0
+    number[FREE_MORE] = 0.0
+    if rest >= 0.0:
+        return
+    length = math.sqrt(square)
+    if not length > number[REACH]:
+        number[REACH] = np.inf
+        return
+    by_second = 0.0
+    by_first = 0.0
+    for d in range(line.shape[2]):
+        by_second += w[0, d] * line[STATED, HALF, d] / length
+        by_first += w[0, d] * rows[STATED, HALF, d] / length
+    number[FREE] = length
+    number[FREE_SECOND] = by_second
+    number[FREE_FIRST] = by_first
+    across = (second - by_second * by_second) + (first - by_first * by_first) + bulge * bulge
+    number[FREE_MORE] = 1.5 * across / (length - number[REACH])
+
+
+@part
+def _fill_bounds(axes, frame, at_row, line, rows, number, w, bound):
+    """Bounds of elongations (m) and rates (m/s) of all members of a part at a relative pose.
+
+    Constant:
+      axes: 2 in a plane, 3 in space.
+    In:
+      frame (any, n_frame), at_row: how ends move, of `priced_candidates.PricedCandidates`, and in which row.
+      line, rows (2, 2, axes): lines of the part's second points and of the tile's first.
+      number (PART_NUMBERS,): of the part.
+    Out:
+      bound (4,): set.
+      w (4, axes): scratch.
+
+    Returns whether there are any: not where ends may meet.
+    """
+    turn = axes
+    speed_at = axes + axes * axes
+    spin_at = speed_at + axes
+    square = 0.0
+    for d in range(axes):
+        at = frame[at_row, d] - rows[LOCAL, MIDDLE, d]
+        along = 0.0
+        rate = frame[at_row, speed_at + d]
+        swing = 0.0
+        for m in range(axes):
+            middle = line[LOCAL, MIDDLE, m]
+            half = line[LOCAL, HALF, m]
+            at += frame[at_row, turn + d * axes + m] * middle
+            along += frame[at_row, turn + d * axes + m] * half
+            rate += frame[at_row, spin_at + d * axes + m] * middle
+            swing += frame[at_row, spin_at + d * axes + m] * half
+        w[0, d] = at
+        w[1, d] = along
+        w[2, d] = rate
+        w[3, d] = swing
+        square += at * at
+    length = math.sqrt(square)
+    reach = number[REACH]
+    shortest = length - reach
+    if not shortest > 0.0:
+        return False
+    inverse = 1.0 / length
+    second = 0.0
+    first = 0.0
+    rate = 0.0
+    swing = 0.0
+    second_square = 0.0
+    first_square = 0.0
+    second_rate = 0.0
+    first_rate = 0.0
+    speed = 0.0
+    for d in range(axes):
+        half = rows[LOCAL, HALF, d]
+        second += w[0, d] * w[1, d]
+        first += w[0, d] * half
+        rate += w[0, d] * w[2, d]
+        swing += w[0, d] * w[3, d]
+        second_square += w[1, d] * w[1, d]
+        first_square += half * half
+        second_rate += w[1, d] * w[2, d]
+        first_rate += half * w[2, d]
+        speed += w[2, d] * w[2, d]
+    speed = math.sqrt(speed)
+    second *= inverse
+    first *= inverse
+    rate *= inverse
+    bulge = number[BULGE]
+    across = (second_square - second * second) + (first_square - first * first) + bulge * bulge
+    spread = abs(second - number[FREE_SECOND]) + abs(first - number[FREE_FIRST]) + 2.0 * bulge
+    spread += WIDER * (1.0 + length)
+    x = length - number[FREE]
+    bound[LOW] = x - spread - number[FREE_MORE]
+    bound[HIGH] = x + spread + 1.5 * across / shortest
+    turning = frame[at_row, spin_at + axes * axes]
+    near = reach / shortest
+    spread = abs(swing + second_rate - second * rate) * inverse + abs(first_rate - first * rate) * inverse
+    spread += 0.6 * near * near * speed + near * turning * reach + bulge * (speed * inverse + turning)
+    spread += WIDER * (1.0 + speed)
+    bound[SLOWEST] = rate - spread
+    bound[FASTEST] = rate + spread
+    return True
+
+
+@part
+def _holds(code, p, curves, rest, t, mode, low, high, bound):
+    """Whether a mode holds for all members with elongations and rates within bounds.
+
+    code, p (8,), curves, rest: the law, numbers of all laws, and the free length (m).
+    t: time (s).
+    mode: the mode.
+    low, high: the least and the largest permanent set (m).
+    bound (4,): of `_fill_bounds`.
+    """
+    for corner in range(4):
+        x = bound[LOW] - high if corner < 2 else bound[HIGH] - low
+        rate = bound[SLOWEST] if corner % 2 == 0 else bound[FASTEST]
+        if not law_margin(code, p, x, rate, mode, t, curves, rest) > 0.0:
+            return False
+    return True
+
+
+@part
+def _all_begin(code, p, curves, rest, t, mode, bound):
+    """Whether all members of a law that remembers begin in a mode, and none with a permanent set.
+
+    Margins do not tell: crushing ends by its rate, at any elongation, but begins at the plateau.
+
+    code, p, curves, rest, t, mode, bound: as of `_holds`.
+    """
+    for corner in range(4):
+        x = bound[LOW] if corner < 2 else bound[HIGH]
+        rate = bound[SLOWEST] if corner % 2 == 0 else bound[FASTEST]
+        begun = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+        if begun != mode or law_first_set(code, p, x, mode) != 0.0:
+            return False
+    return True
+
+
+@part
+def _is_over(code, p, curves, rest, t, mode, low, high, bound):
+    """Whether a mode has ended for all of them: a margin is not above its tangent.
+
+    code, p, curves, rest, t, mode, low, high, bound: as of `_holds`.
+    """
+    x = 0.5 * (bound[LOW] - high + bound[HIGH] - low)
+    rate = 0.5 * (bound[SLOWEST] + bound[FASTEST])
+    by_x, by_rate = law_margin_slopes(code, p, x, rate, mode, t, curves, rest)
+    most = abs(by_x) * (bound[HIGH] - low - x) + abs(by_rate) * (bound[FASTEST] - rate)
+    return law_margin(code, p, x, rate, mode, t, curves, rest) + most < 0.0
+
+
+@kernel
+def modes_at_nodes(model, candidates, k, s, which, spans, mode):
+    """In which mode all members of a part are at each node of a step, by a law that does not remember.
+
+    In:
+      model: with the numbers of the laws.
+      candidates, k: a `PricedCandidates`, and the number of the run.
+      s: number of the step.
+      which: number of the part.
+    Out:
+      mode (NODES,): of all, or UNSURE where bounds do not tell.
+      spans: of `make_spans`, of which the bounds are overwritten.
+    """
+    code = candidates.run[k, CODE]
+    p = candidates.law[k]
+    curves = model.curves
+    line, number, w, bound = spans
+    rest = number[which, FREE]
+    axes = freedoms(model) - rotations(model)
+    for m in range(NODES):
+        mode[m] = UNSURE
+        o = candidates.step[s, FIRST_NODE] + m
+        t = candidates.step_time[s, 0] + NODE[m] * candidates.step_time[s, 1]
+        rows = line[ROWS_OF_ALL]
+        if not _fill_bounds(axes, candidates.node_frame, o, line[which], rows, number[which], w, bound):
+            continue
+        x = 0.5 * (bound[LOW] + bound[HIGH])
+        rate = 0.5 * (bound[SLOWEST] + bound[FASTEST])
+        now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+        if _holds(code, p, curves, rest, t, now, 0.0, 0.0, bound):
+            mode[m] = now
+
+
+@kernel
+def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
+    """What is known of the modes of all members of a part in a step by a law that remembers, or in a state.
+
+    In:
+      model: with the numbers of the laws.
+      candidates, k: a `PricedCandidates`, and the number of the run.
+      u: number of the step among those of the run; of laws whose modes are PIECES, of the state.
+      which: number of the part.
+      mode: that all begin in; negative where it is to be found: the law does not remember, or has not begun.
+      low, high: the least and the largest of their permanent sets (m).
+    Out:
+      spans: of `make_spans`, of which the bounds are overwritten.
+
+    Returns UNSURE, a mode of which none leaves, or LEAVES less the mode that all leave; and the mode that all end in.
+    """
+    run = candidates.run[k]
+    code = run[CODE]
+    p = candidates.law[k]
+    curves = model.curves
+    line, number, w, bound = spans
+    rows = line[ROWS_OF_ALL]
+    line = line[which]
+    number = number[which]
+    rest = number[FREE]
+    at_state = run[MODES] != FOLLOWED
+    o = run[FIRST_STATE] + u
+    s = run[FIRST_STEP] + u
+    if not at_state and candidates.step[s, KIND] == POINT:
+        at_state = np.bool_(True)
+        o = candidates.step[s, FIRST_STAGE]
+    frame = candidates.frame if at_state else candidates.node_frame
+    first = o if at_state else candidates.step[s, FIRST_NODE]
+    begin = candidates.when[o] if at_state else candidates.step_time[s, 0]
+    long = 0.0 if at_state else candidates.step_time[s, 1]
+    remembers = law_remembers(code)
+    axes = freedoms(model) - rotations(model)
+    begins = mode
+    now = mode
+    sign = 0.0
+    for m in range(1 if at_state else NODES):
+        t = begin + NODE[m] * long
+        if not _fill_bounds(axes, frame, first + m, line, rows, number, w, bound):
+            return UNSURE, UNSURE
+        before = sign
+        sign = 1.0 if bound[SLOWEST] > 0.0 else -1.0 if bound[FASTEST] < 0.0 else 0.0
+        x = 0.5 * (bound[LOW] - high + bound[HIGH] - low)
+        rate = 0.5 * (bound[SLOWEST] + bound[FASTEST])
+        if now < 0:
+            now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+            begins = now
+            if remembers and not _all_begin(code, p, curves, rest, t, now, bound):
+                return UNSURE, UNSURE
+        if _holds(code, p, curves, rest, t, now, low, high, bound):
+            continue
+        if m == 0 or now != begins or low != high or sign == 0.0 or sign != before:
+            return UNSURE, UNSURE
+        if not _is_over(code, p, curves, rest, t, now, low, high, bound):
+            return UNSURE, UNSURE
+        new = np.int64(law_next(code, p, x, rate, 0.0, now, t, curves, rest))
+        if new == now or law_makes_set(code, now, new):
+            return UNSURE, UNSURE
+        if not _holds(code, p, curves, rest, t, new, low, high, bound):
+            return UNSURE, UNSURE
+        now = new
+    return (begins if now == begins else LEAVES - begins), now

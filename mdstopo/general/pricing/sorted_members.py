@@ -1,0 +1,270 @@
+"""Members that a step finds in different modes, sorted by the one in which each begins and the one in which it ends.
+
+What a member does in a step depends on which of them it is: one that stays in a mode is summed over stages, one that
+leaves it for another over the pieces of both. Members of one class do what is as smooth in where their ends are as by a
+law without modes, and it goes on smoothly over all members beside them (`switching_prices.price_switched`).
+
+Which class a member is in is not told from others: each is looked at at the nodes of the step, as it is when it is
+followed by itself (`switching_prices.price_step`).
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import lanes, larger, load, negative, zero
+from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
+from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODE, NODES
+from mdstopo.general.pricing.certain_modes import NARROW, UNSURE
+from mdstopo.general.pricing.switching_prices import CLOSE, range_of
+from mdstopo.general.pricing.switching_together import is_quick
+from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, RATE, WORKS, member_works
+from mdstopo.mechanics.laws.law_table import (
+    law_first_set,
+    law_margin,
+    law_margin_slopes,
+    law_remembers,
+    law_start,
+)
+from mdstopo.sensitivity.tile_interpolation import BROAD, PLACES, SHORT, TALL
+
+#: classes of members of a part in a step, at most
+CLASSES = 6
+#: of each class: the mode in which its members begin, the one in which they end, and how many there are
+CLASS_NUMBERS = 3
+FROM, TO, COUNT = range(CLASS_NUMBERS)
+#: the class of members that are in none
+UNSORTED = -1
+#: members that are sorted at once
+MANY = SHORT * TALL
+#: modes in which members may stay that are tried, at most
+TRIED = 4
+#: corners of the range of elongations and rates of all members
+CORNERS = 4
+#: of a tangent of a margin, a linear function: its value where elongation and rate are zero, and its slopes by these
+TANGENT_NUMBERS = 3
+AT_ZERO, BY_ELONGATION, BY_RATE = range(TANGENT_NUMBERS)
+#: vectors of members are sorted where margins are above this: rounding does not decide (m, m/s or a part)
+SURE = 1e-11
+
+
+@kernel
+def make_sorting():
+    """What sorting a tile needs: the class of each member, what is known of the classes, places of some members, modes
+    of all members of a part at the nodes of a step, what members do there, which parts are not sorted; modes in which
+    members may stay, and the tangents of their margins."""
+    return (
+        np.zeros(PLACES, np.int64),
+        np.zeros((CLASSES, CLASS_NUMBERS), np.int64),
+        np.zeros(PLACES, np.int64),
+        np.zeros(NODES, np.int64),
+        np.zeros((NODES, WORKS, MANY)),
+        np.zeros(BROAD // NARROW, np.int64),
+        np.zeros(TRIED, np.int64),
+        np.zeros((TRIED, CORNERS, TANGENT_NUMBERS)),
+    )
+
+
+@part
+def join_class(old, new, count, classes):
+    """Add members to the class of those that begin in one mode and end in another, which is made if there is none.
+
+    In:
+      old, new: the modes.
+      count: how many members are added, 1 or more.
+    In place:
+      classes (CLASSES, CLASS_NUMBERS): of those that there are.
+
+    Returns the number of the class; UNSORTED where there are too many classes.
+    """
+    for c in range(CLASSES):
+        if classes[c, COUNT] == 0:
+            classes[c, FROM] = old
+            classes[c, TO] = new
+        if classes[c, FROM] == old and classes[c, TO] == new:
+            classes[c, COUNT] += count
+            return c
+    return UNSORTED
+
+
+@part
+def modes_of_all(mode):
+    """The mode in which all members of a part begin a step, and the one in which they end it; UNSURE where members
+    differ, and where there are more modes.
+
+    mode (NODES,): of `certain_modes.modes_at_nodes`.
+    """
+    unsure = np.int64(UNSURE)
+    now = mode[0]
+    for m in range(NODES):
+        if mode[m] == UNSURE or (mode[m] != now and now != mode[0]):
+            return unsure, unsure
+        now = mode[m]
+    return mode[0], now
+
+
+@kernel
+def sort_members(model, candidates, k, s, first, size, height, known, begin, kept, sorting):
+    """Sort the members of some columns of a tile.
+
+    In:
+      model: with the members of the tile (`load_all`).
+      candidates, k: a `PricedCandidates`, and the number of the run.
+      s: the number of the step.
+      first, size, height: the first column, how many there are, SHORT at most, and how many rows.
+      known: whether it is known in which modes they begin.
+      begin, kept (PLACES,): these, and their permanent sets (m); of a law that does not remember, zeros.
+    In place:
+      sorting: of `make_sorting`: with the modes of all members at nodes, UNSURE where the members are to be looked at,
+        who are overwritten there; classes of the members are set, and added to those that there are.
+    """
+    kind, classes, _, mode, works, _, tried, _ = sorting
+    p = candidates.law[k]
+    code = candidates.run[k, CODE]
+    lo = PLACES + first * TALL
+    free = model.member[MEMBER_FREE_LENGTH]
+    for m in range(NODES):
+        if mode[m] == UNSURE:
+            o = candidates.step[s, FIRST_NODE] + m
+            member_works(model, lo, size * TALL, candidates.node_pose[o], candidates.node_change[o], works[m])
+            if law_remembers(code):
+                for i in range(size * TALL):
+                    works[m, ELONGATION, i] -= kept[_place(first, i)]
+    count = np.int64(0)
+    if is_quick(code, p, model.curves):
+        count = _fill_tried(code, p, model.curves, candidates.step_time[s, 0], size, sorting)
+    for i in range(0, size * TALL, lanes()):
+        # a bit for each lane
+        left = (1 << max(min(height - i % TALL, lanes()), 0)) - 1
+        for n in range(count):
+            bits = _stay_in(n, i, sorting) & left
+            for lane in range(lanes() if bits != 0 else 0):
+                at = _place(first, i + lane)
+                if (bits >> lane) & 1 == 1:
+                    kind[at] = join_class(tried[n], tried[n], 1, classes)
+                    left &= ~(1 << lane)
+        for lane in range(lanes() if left != 0 else 0):
+            if (left >> lane) & 1 == 1:
+                at = _place(first, i + lane)
+                old = begin[at] if known else np.int64(UNSURE)
+                old, new = _modes_of(
+                    code, p, model.curves, free[lo + i + lane], candidates.step_time[s], old, mode, works, i + lane
+                )  # fmt: skip
+                kind[at] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
+
+
+@part
+def _place(first, i):
+    """The place in the tile of member i of columns from the first one on."""
+    return i % TALL * BROAD + first + i // TALL
+
+
+@part
+def _fill_tried(code, p, curves, t, size, sorting):
+    """Modes in which some members may stay, and tangents of their margins at the corners of the range of elongations
+    and rates of all members.
+
+    Within the range a margin is the least of its tangents at the corners, being the lesser of two linear functions.
+
+    code, p (8,), curves, t: the law, numbers of all laws, and any time (s), on which the law does not depend.
+    size: how many columns there are.
+    sorting: of `make_sorting`, with what the members do; the modes and the tangents are set.
+
+    Returns how many modes there are; 0 where bounds tell the modes at all nodes, so that no range is known.
+    """
+    _, _, _, mode, works, _, tried, tangent = sorting
+    box = np.array([np.inf, -np.inf, np.inf, -np.inf])
+    for m in range(NODES):
+        if mode[m] == UNSURE:
+            for row in range(2):
+                low, high = range_of(works[m, ELONGATION if row == 0 else RATE], size * TALL)
+                box[2 * row] = min(box[2 * row], low)
+                box[2 * row + 1] = max(box[2 * row + 1], high)
+    count = np.int64(0)
+    if box[0] > box[1]:
+        return count
+    for i in range(CORNERS):
+        now = np.int64(law_start(code, p, box[i // 2], box[2 + i % 2], 0.0, t, curves, 1.0))
+        new = count < TRIED
+        for n in range(count):
+            new = new and tried[n] != now
+        if new:
+            tried[count] = now
+            count += 1
+    for n in range(count):
+        for corner in range(CORNERS):
+            x = box[corner // 2]
+            rate = box[2 + corner % 2]
+            by_x, by_rate = law_margin_slopes(code, p, x, rate, tried[n], t, curves, 1.0)
+            tangent[n, corner, AT_ZERO] = (
+                law_margin(code, p, x, rate, tried[n], t, curves, 1.0) - by_x * x - by_rate * rate
+            )
+            tangent[n, corner, BY_ELONGATION] = by_x
+            tangent[n, corner, BY_RATE] = by_rate
+    return count
+
+
+@part
+def _stay_in(n, i, sorting):
+    """A bit for each member of a vector of them that stays in a mode.
+
+    n, i: the number of the mode among those that were filled, and of the first member.
+    sorting: of `make_sorting`.
+    """
+    _, _, _, mode, works, _, tried, tangent = sorting
+    own = tangent[n]
+    bits = (1 << lanes()) - 1
+    for m in range(NODES):
+        if mode[m] != UNSURE:
+            bits = bits if mode[m] == tried[n] else 0
+            continue
+        x = load(works[m, ELONGATION], i)
+        rate = load(works[m, RATE], i)
+        over = zero() - np.inf
+        for corner in range(CORNERS):
+            value = own[corner, BY_ELONGATION] * x + own[corner, BY_RATE] * rate + own[corner, AT_ZERO]
+            over = larger(over, zero() - value)
+        bits &= ~negative(zero() - over - (CLOSE if m == 0 else SURE))
+    return bits
+
+
+@part
+def _modes_of(code, p, curves, rest, time, old, mode, works, i):
+    """The mode in which a member begins a step, and the one in which it ends it; UNSURE where there are more, or
+    where values at nodes do not tell.
+
+    code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+    time (2,): start and length of the step (s).
+    old: the mode with which it begins, or UNSURE where it is to be found.
+    mode (NODES,): of all members at the nodes, or UNSURE.
+    works (NODES, WORKS, MANY), i: what members do at the nodes where that is so, less their sets, and which one it is.
+    """
+    unsure = np.int64(UNSURE)
+    if old == UNSURE:
+        old = mode[0]
+    if old == UNSURE:
+        x = works[0, ELONGATION, i]
+        rate = works[0, RATE, i]
+        old = np.int64(law_start(code, p, x, rate, 0.0, time[0], curves, rest))
+        is_clear = law_margin(code, p, x, rate, old, time[0], curves, rest) > CLOSE
+        if not is_clear or law_first_set(code, p, x, old) != 0.0:
+            return unsure, unsure
+    now = old
+    for m in range(1, NODES):
+        if mode[m] == now:
+            continue
+        new = mode[m]
+        if new == UNSURE:
+            x = works[m, ELONGATION, i]
+            rate = works[m, RATE, i]
+            t = time[0] + NODE[m] * time[1]
+            if law_margin(code, p, x, rate, now, t, curves, rest) >= 0.0:
+                continue
+            if law_remembers(code):
+                return unsure, unsure  # its permanent set may change: it is followed by itself
+            new = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+            if new == now or not law_margin(code, p, x, rate, new, t, curves, rest) >= 0.0:
+                return unsure, unsure
+        if now != old:
+            return unsure, unsure
+        now = new
+    return old, now

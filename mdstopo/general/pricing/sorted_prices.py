@@ -1,0 +1,277 @@
+"""A step in which some members of a part of a tile leave their mode, and others do not: sorted by what they do in it.
+
+Members that stay in one mode do what is smooth in where their ends are, and it goes on smoothly over the members beside
+them: it is computed for a few of the part, whatever these do themselves, and follows for those that stay. Members that
+leave a mode for the same other one are followed together (`switching_together`), and the few that do anything else one
+by one (`switching_prices.price_step`).
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.vector import WIDE
+from mdstopo.general.model.priced_candidates import CODE, FIRST_STAGE, KIND, LAST_STAGE, MOVES, WHOLE
+from mdstopo.general.pricing.certain_modes import BOUND_LEVELS, NARROW, UNSURE, modes_at_nodes
+from mdstopo.general.pricing.loaded_members import add_states, load_all, load_members, take_members
+from mdstopo.general.pricing.sorted_members import (
+    CLASSES,
+    COUNT,
+    FROM,
+    TO,
+    UNSORTED,
+    join_class,
+    modes_of_all,
+    sort_members,
+)
+from mdstopo.general.pricing.switching_prices import ROW, price_step
+from mdstopo.general.pricing.switching_together import SUM, TOGETHER, is_quick, price_switched
+from mdstopo.mechanics.laws.law_table import law_is_idle, law_remembers
+from mdstopo.sensitivity.tile_interpolation import (
+    BROAD,
+    DONE,
+    LEVEL,
+    LEVELS,
+    PARTS,
+    PRICED,
+    SHORT,
+    begin_part,
+    extent,
+    next_candidates,
+    number_candidates,
+    take_prices,
+)
+
+#: classes of as many members or fewer are computed member by member
+FEW = 96
+#: the prices of a class in a step may be off by this part of what those of all listed steps together may be. It is not
+#: divided by the number of steps, too: over many steps with classes more may add up
+SHARE_OF_A_CLASS = 0.25
+#: the class of members that have their prices
+PAID = -2
+#: the level of columns that are no part of a tile with bounds
+NO_LEVEL = -1
+#: place behind those of the smallest parts: whether all members of the tile are in the model
+LOADED = PARTS
+
+
+@kernel
+def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile, buffers, price):
+    """Price the members of some columns of a tile in a step.
+
+    In:
+      model, candidates, k: as of `tile_prices.price_run`, of a law whose members are followed.
+      s: the number of the step.
+      level, first, size: of the part, its first column, and how many it has; NO_LEVEL: its members are looked at one by
+        one.
+      smooth: whether some members may be computed from others.
+      begun: whether members of a law that remembers are in modes.
+      tile: grids, i, j and error as of `tile_interpolation.take_prices`.
+    In place:
+      buffers: of `tile_prices.price_run`; of a law that remembers the modes behind the step are set, in row 0 behind a
+        whole step, else in row 1, and the permanent sets behind it in `fresh`.
+      price (PLACES,): added to.
+
+    Returns how many prices of steps were computed.
+    """
+    grids, i, j, _ = tile
+    _, lists, _, _, sorting, _ = buffers
+    modes, sets, todo, whole = lists[4], lists[5], lists[6], lists[9]
+    kind, classes, places, mode = sorting[0], sorting[1], sorting[2], sorting[3]
+    code = candidates.run[k, CODE]
+    height, _ = extent(grids, i, j)
+    if todo[LOADED] == 0:
+        load_all(model, candidates, k, grids, i, j, whole)
+        todo[LOADED] = 1
+    classes[:] = 0
+    if level != NO_LEVEL:
+        _sort_part(model, candidates, k, s, level, first, height, buffers)
+    else:
+        mode[:] = UNSURE
+        known = law_remembers(code) and begun
+        sort_members(model, candidates, k, s, first, size, height, known, modes[0], sets[0], sorting)
+    to = np.int64(0) if candidates.step[s, KIND] == WHOLE else np.int64(1)
+    done = 0.0
+    for c in range(CLASSES):
+        stays = classes[c, FROM] == classes[c, TO]
+        if stays and smooth and classes[c, COUNT] > FEW and not law_is_idle(code, classes[c, FROM]):
+            done += _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price)
+        if classes[c, COUNT] > 0 and (stays or is_quick(code, candidates.law[k], model.curves)):
+            done += _price_each(model, candidates, k, s, first, size, c, height, to, buffers, price)
+        else:
+            for m in range(_places_of(kind, c, first, size, height, places)):
+                kind[places[m]] = UNSORTED
+    return done + _follow_others(model, candidates, k, s, first, size, begun, height, to, buffers, price)
+
+
+@kernel
+def _places_of(kind, c, first, size, height, places):
+    """List the members of a class in some columns of a tile, row by row.
+
+    In:
+      kind (PLACES,): the class of each member.
+      c: the class, or UNSORTED.
+      first, size, height: the first column, how many there are, and how many rows.
+    Out:
+      places (PLACES,): the places of these members in the tile come first.
+
+    Returns how many there are.
+    """
+    count = np.int64(0)
+    for a in range(height):
+        for b in range(a * BROAD + first, a * BROAD + first + size):
+            if kind[b] == c:
+                places[count] = b
+                count += 1
+    return count
+
+
+@kernel
+def _sort_part(model, candidates, k, s, level, first, height, buffers):
+    """Sort the members of a part by a law that does not remember: those of its halves, and so on, by bounds, and where
+    these do not tell member by member.
+
+    model, candidates, k, s, level, first: as of `price_part`.
+    height: rows of the tile.
+    buffers: of `tile_prices.price_run`, of which the sorting is filled.
+    """
+    _, lists, spans, _, sorting, _ = buffers
+    modes, sets = lists[4], lists[5]
+    kind, classes, mode, unsorted = sorting[0], sorting[1], sorting[3], sorting[5]
+    begin = first // NARROW
+    behind = begin + (BROAD >> level) // NARROW
+    unsorted[begin:behind] = 1
+    for inner in range(level, BOUND_LEVELS):
+        size = BROAD >> inner
+        for narrow in range(begin, behind, size // NARROW):
+            if unsorted[narrow] == 0:
+                continue
+            at = narrow * NARROW
+            modes_at_nodes(model, candidates, k, s, (1 << inner) - 1 + at // size, spans, mode)
+            old, new = modes_of_all(mode)
+            if old == UNSURE and size > NARROW:
+                continue
+            unsorted[narrow : narrow + size // NARROW] = 0
+            if old != UNSURE:
+                own = join_class(old, new, height * size, classes)
+                for a in range(height):
+                    kind[a * BROAD + at : a * BROAD + at + size] = own
+                continue
+            sort_members(model, candidates, k, s, at, size, height, np.bool_(False), modes[0], sets[0], sorting)
+
+
+@kernel
+def _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price):
+    """Price the members of a part that stay in a mode from those of few of the part.
+
+    model, candidates, k, s, level, first, tile, buffers, price: as of `price_part`.
+    c: the class. Members that have their prices are PAID then.
+
+    Returns how many prices were computed.
+    """
+    grids, i, j, error = tile
+    scratch, lists, _, following, sorting, _ = buffers
+    found, works = lists[7], lists[10]
+    plan, part_level, _, _, index, values, _ = scratch
+    kind, classes, places = sorting[0], sorting[1], sorting[2]
+    step = candidates.step[s]
+    height, _ = extent(grids, i, j)
+    found[1, 0] = 0.0
+    begin_part(level, first, scratch)
+    while next_candidates(grids, i, j, scratch) and plan[LEVEL] < LEVELS:
+        members = number_candidates(i, j, scratch)
+        load_members(model, candidates, k, index, members, np.int64(0))
+        values[:members] = 0.0
+        add_states(
+            model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], members, classes[c, FROM], found[1, :1], works,
+            following, values,
+        )  # fmt: skip
+        take_prices(grids, i, j, error * SHARE_OF_A_CLASS, scratch, found[0])
+    for m in range(_places_of(kind, c, first, BROAD >> level, height, places)):
+        b = places[m]
+        if part_level[b % BROAD // SHORT] == DONE:
+            price[b] += found[0, b]
+            kind[b] = PAID
+    return 1.0 * plan[PRICED]
+
+
+@kernel
+def _price_each(model, candidates, k, s, first, size, c, height, to, buffers, price):
+    """Price the members of a class one by one, in vectors. Those for which that does not do are UNSORTED then.
+
+    model, candidates, k, s, first, size, buffers, price: as of `price_part`.
+    c: the class.
+    height: rows of the tile.
+    to: the row for modes behind the step.
+
+    Returns how many prices were computed.
+    """
+    scratch, lists, _, following, sorting, switching = buffers
+    modes, sets, found, fresh, works = lists[4], lists[5], lists[7], lists[8], lists[10]
+    kind, classes, places = sorting[0], sorting[1], sorting[2]
+    values = scratch[5]
+    step = candidates.step[s]
+    old = classes[c, FROM]
+    new = classes[c, TO]
+    count = _places_of(kind, c, first, size, height, places)
+    for m in range(count):
+        fresh[places[m]] = sets[0, places[m]]
+    if old != new:
+        for at in range(0, count, TOGETHER):
+            wide = min(TOGETHER, count - at)
+            take_members(model, places[at : at + wide], wide, np.int64(TOGETHER))
+            price_switched(model, candidates, k, wide, s, old, new, switching)
+            for m in range(wide):
+                b = places[at + m]
+                if switching[4][SUM, m] == switching[4][SUM, m]:
+                    price[b] += switching[4][SUM, m]
+                    modes[to, b] = new
+                else:
+                    kind[b] = UNSORTED
+        return 1.0 * count
+    for m in range(count):
+        modes[to, places[m]] = old
+        found[1, m] = sets[0, places[m]]
+    if count == 0 or step[MOVES] == 0 or law_is_idle(candidates.run[k, CODE], old):
+        return 0.0
+    behind = (count + WIDE - 1) // WIDE * WIDE
+    take_members(model, places, count, behind)
+    values[:behind] = 0.0
+    kept = found[1, :count] if law_remembers(candidates.run[k, CODE]) else found[1, :1]
+    add_states(model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], count, old, kept, works, following, values)
+    for m in range(count):
+        price[places[m]] += values[m]
+    return 1.0 * count
+
+
+@kernel
+def _follow_others(model, candidates, k, s, first, size, begun, height, to, buffers, price):
+    """Follow those members that are in no class.
+
+    model, candidates, k, s, first, size, begun, buffers, price: as of `price_part`.
+    height, to: as of `_price_each`.
+
+    Returns how many these are.
+    """
+    _, lists, _, following, sorting, _ = buffers
+    modes, sets, fresh = lists[4], lists[5], lists[8]
+    kind, places = sorting[0], sorting[2]
+    yes = np.bool_(True)
+    few = np.zeros(ROW)
+    count = _places_of(kind, np.int64(UNSORTED), first, size, height, places)
+    for at in range(0, count, ROW):
+        wide = min(ROW, count - at)
+        take_members(model, places[at : at + wide], wide, np.int64(ROW))
+        for m in range(wide):
+            following[4][0, m] = modes[0, places[at + m]]
+            following[5][0, m] = sets[0, places[at + m]]
+        few[:] = 0.0
+        price_step(
+            model, candidates, k, np.int64(0), wide, s, following[4][0], following[5][0], begun, yes, following, few
+        )  # fmt: skip
+        for m in range(wide):
+            b = places[at + m]
+            price[b] += few[m]
+            if law_remembers(candidates.run[k, CODE]):
+                modes[to, b] = following[4][1, m]
+                fresh[b] = following[5][1, m]
+    return 1.0 * count

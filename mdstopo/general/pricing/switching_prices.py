@@ -1,0 +1,618 @@
+"""The price of a member that is not built by a law that switches: it is followed through the steps of the motion.
+
+No step ends at a switch of a member of alpha = 0. So its elongation is looked at at some nodes of each step. Where it
+leaves its mode within the step, the sum over stages, which is for smooth forces and energies, gives way to an integral
+over the pieces: there the virtual change, and the weight of the energy, are the polynomials with the moments that the
+stages give.
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import lanes, larger, largest, load, store, where_larger, zero
+from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
+from mdstopo.general.model.priced_candidates import (
+    CODE,
+    FIRST_NODE,
+    FIRST_STAGE,
+    FIRST_STEP,
+    FROM_START,
+    KIND,
+    LAST_STAGE,
+    LAST_STEP,
+    MOVES,
+    NODE,
+    NODES,
+    POINT,
+    POWERS,
+    WHOLE,
+)
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    ALONG,
+    ELONGATION,
+    INVERSE,
+    RATE,
+    WORKS,
+    member_motion,
+    member_work,
+    member_works,
+    second_rate,
+)
+from mdstopo.mechanics.laws.law_table import (
+    law,
+    law_degree,
+    law_first_set,
+    law_is_idle,
+    law_margin,
+    law_next,
+    law_remembers,
+    law_set,
+    law_start,
+)
+
+#: points and weights of an integral over a piece of a step, as fractions of it (Gauss)
+GAUSS = 0.5 * np.array(np.polynomial.legendre.leggauss(5)) + np.array([[0.5], [0.0]])
+#: what is known of a member at the nodes: the first rows of `member_works`, ELONGATION, RATE and ALONG
+NODE_ROWS = 3
+#: pieces of a step in which a member stays in a mode: the fraction at which one begins, the mode, the permanent set;
+#: how many changes are followed, and to which fraction of the step each is located
+PIECE = 3
+BEGIN, PIECE_MODE, PIECE_SET = range(PIECE)
+CHANGES = 4
+LOCATED = 2.0**-40
+#: places from -1 to 1 at which a law that is a polynomial is evaluated, for three coefficients and for five, and what
+#: makes these of values there
+PLACE = np.array([[1.0, 0.0, -1.0, 0.0, 0.0], np.cos(np.pi * np.arange(5) / 4.0)])
+FROM_PLACES = np.zeros((2, 5, 5))
+FROM_PLACES[0, :3, :3] = np.linalg.inv(np.vander(PLACE[0, :3], increasing=True))
+FROM_PLACES[1] = np.linalg.inv(np.vander(PLACE[1], increasing=True))
+#: members that are followed at once, and what stands for the mode of one that leaves it
+ROW = 16
+NOWHERE = -1
+#: a margin below this leaves open in which mode a member begins, and its second derivative decides (m, m/s or a part)
+CLOSE = 1e-6
+
+
+@kernel
+def make_following():
+    """What following members needs: values at nodes, coefficients of the polynomials through them, pieces; what members
+    do at nodes and at a stage, and prices; modes and permanent sets with which members begin a step, end it, stay.
+    """
+    return (
+        np.empty((NODE_ROWS, NODES)),
+        np.empty((NODE_ROWS, NODES)),
+        np.zeros((CHANGES + 1, PIECE)),
+        np.zeros((NODES + 2, WORKS, ROW)),
+        np.zeros((3, ROW), np.int64),
+        np.zeros((3, ROW)),
+    )
+
+
+@kernel
+def price_followed(model, candidates, k, at, count, following, price):
+    """Add what members of a law that switches do in the steps of a run.
+
+    model: with the members.
+    candidates, k: a `PricedCandidates`, and the number of the run.
+    at, count: the first member, and how many there are, ROW at most.
+    following: of `make_following`, overwritten.
+    price (count,): added to.
+    """
+    run = candidates.run[k]
+    modes = following[4]
+    sets = following[5]
+    modes[:] = 0
+    sets[:] = 0.0
+    begun = run[FROM_START] == 0  # a law that acts later begins in mode 0, unset
+    ends = np.int64(0)
+    for s in range(run[FIRST_STEP], run[LAST_STEP]):
+        kind = candidates.step[s, KIND]
+        if kind == POINT:
+            for i in range(count):
+                started = begun or ends != 0
+                price[i] += price_point(model, candidates, k, at + i, s, modes[ends, i], sets[ends, i], started)
+            continue
+        if candidates.step[s, MOVES] == 0 and not law_remembers(run[CODE]):
+            continue
+        price_step(model, candidates, k, at, count, s, modes[0], sets[0], begun, np.bool_(False), following, price)
+        # a part of a step leaves the modes with which the whole one begins
+        ends = np.int64(1)
+        if kind == WHOLE:
+            modes[0] = modes[1]
+            sets[0] = sets[1]
+            ends = np.int64(0)
+            begun = np.bool_(True)
+
+
+@kernel
+def price_point(model, candidates, k, i, s, mode, kept, begun):
+    """What member i of a law that switches does at a state alone.
+
+    model: with the members.
+    candidates, k, i: a `PricedCandidates`, the number of the run, and the member.
+    s: the number of the state among the steps.
+    mode, kept: the mode that the member is in, and its permanent set (m); of a law that does not remember, any.
+    begun: whether it is in a mode.
+    """
+    code = candidates.run[k, CODE]
+    o = candidates.step[s, FIRST_STAGE]
+    length, x, rate = member_motion(model, i, candidates.pose[o, 0])
+    if not length > 0.0:
+        return 0.0
+    if not begun or not law_remembers(code):
+        p = candidates.law[k]
+        second = second_rate(model, i, candidates.pose[o, 0], candidates.pose_a[o])
+        rest = model.member[MEMBER_FREE_LENGTH, i]
+        mode = law_start(code, p, x, rate, second, candidates.when[o], model.curves, rest)
+        kept = law_first_set(code, p, x, mode)
+    _, _, along = member_work(model, i, candidates.pose[o, 0], candidates.change[o, 0])
+    f, _, _, energy, _ = law(
+        code, candidates.law[k], x - kept, rate, mode, candidates.when[o], candidates.level[o], model.curves,
+        model.member[MEMBER_FREE_LENGTH, i],
+    )  # fmt: skip
+    return f * along + candidates.energy[o] * energy
+
+
+@kernel
+def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quick, following, price):
+    """Add what members of a law that switches do in a step.
+
+    A step in which a member stays in its mode is summed over its stages, as for a member that is built. In a step in
+    which its mode changes, the force of each mode times the member's part of the virtual change, and the energy times
+    its weight, are integrated over the mode's piece, all from their values at the nodes.
+
+    In:
+      model: with the members.
+      candidates, k: a `PricedCandidates`, and the number of the run.
+      at, count: the first member, and how many there are, ROW at most.
+      s: the number of the step.
+      begin, begin_set (count,): modes that they are in, and their permanent sets (m), unless they are to be found.
+      begun: whether they are in modes.
+      quick: whether last digits may depend on which members are followed together.
+    Out:
+      following: of `make_following`: its modes and sets in row 1 are those with which the members end.
+      price (count,): added to.
+    """
+    node, power, pieces, works, modes, sets = following
+    p = candidates.law[k]
+    code = candidates.run[k, CODE]
+    curves = model.curves
+    free = model.member[MEMBER_FREE_LENGTH]
+    step = candidates.step[s]
+    time = candidates.step_time[s]
+    first = step[FIRST_NODE]
+    level = candidates.node_level[first : first + NODES]
+    weight = candidates.node_energy[first : first + NODES]
+    found = begun and law_remembers(code)
+    stay = False
+    for m in range(NODES):
+        o = first + m
+        member_works(model, at, count, candidates.node_pose[o], candidates.node_change[o], works[m])
+    for i in range(count):
+        for m in range(NODES):
+            node[ELONGATION, m] = works[m, ELONGATION, i]
+            node[RATE, m] = works[m, RATE, i]
+        rest = free[at + i]
+        mode = np.int64(begin[i])
+        kept = begin_set[i]
+        if not found:
+            mode = np.int64(law_start(code, p, node[ELONGATION, 0], node[RATE, 0], 0.0, time[0], curves, rest))
+            if not law_margin(code, p, node[ELONGATION, 0], node[RATE, 0], mode, time[0], curves, rest) > CLOSE:
+                mode = _first_mode(model, candidates, k, at + i, s, node)
+            kept = law_first_set(code, p, node[ELONGATION, 0], mode)
+        last = _follow(code, p, curves, rest, time, mode, kept, node, power, pieces)
+        modes[1, i] = int(pieces[last, PIECE_MODE])
+        sets[1, i] = pieces[last, PIECE_SET]
+        modes[2, i] = mode if last == 0 and not law_is_idle(code, mode) else np.int64(NOWHERE)
+        sets[2, i] = kept
+        stay = stay or modes[2, i] != NOWHERE
+        if last > 0 and step[MOVES] != 0:
+            for m in range(NODES):
+                node[ALONG, m] = works[m, ALONG, i]
+            price[i] += _over_pieces(code, p, curves, rest, time, level, weight, last, node, power, pieces)
+    if stay and step[MOVES] != 0:
+        _add_stages(model, candidates, k, at, count, s, quick, following, price)
+
+
+@part
+def _add_stages(model, candidates, k, at, count, s, quick, following, price):
+    """Add what the members that stay in their modes do in a step: the second part of `price_step`.
+
+    model, candidates, k, at, count, s, quick, price: as there.
+    following: of `make_following`, of which row 2 of the modes and sets counts, NOWHERE where a member does not stay.
+    """
+    node, power, _, works, modes, sets = following
+    p = candidates.law[k]
+    code = candidates.run[k, CODE]
+    curves = model.curves
+    free = model.member[MEMBER_FREE_LENGTH]
+    step = candidates.step[s]
+    main = np.int64(NOWHERE)
+    like = np.int64(0)
+    for i in range(count):
+        if main == NOWHERE:
+            main = modes[2, i]
+            like = np.int64(i)
+    quick = quick and law_degree(code) > 0
+    now = works[NODES]
+    found_now = works[NODES + 1, 0]
+    for o in range(step[FIRST_STAGE], step[LAST_STAGE]):
+        t = candidates.when[o]
+        value = candidates.level[o]
+        member_works(model, at, count, candidates.pose[o, 0], candidates.change[o, 0], now)
+        for i in range(count):
+            now[ELONGATION, i] -= sets[2, i]
+            if modes[2, i] != NOWHERE and now[INVERSE, i] != 0.0 and not (quick and modes[2, i] == main):
+                f, _, _, energy, _ = law(
+                    code, p, now[ELONGATION, i], now[RATE, i], modes[2, i], t, value, curves, free[at + i]
+                )  # fmt: skip
+                price[i] += f * now[ALONG, i] + candidates.energy[o] * energy
+        if not quick:
+            continue
+        for i in range(count):
+            if modes[2, i] != main:
+                # the polynomial is as exact as the range of the members that it is for is narrow
+                now[ELONGATION, i] = now[ELONGATION, like]
+        found_now[:] = 0.0
+        add_polynomial(
+            code, p, curves, t, value, candidates.energy[o], now, count, main, node, power, found_now
+        )  # fmt: skip
+        for i in range(count):
+            if modes[2, i] == main:
+                price[i] += found_now[i]
+
+
+@part
+def range_of(x, count):
+    """The least and the largest of the first numbers of x, of which there are so many."""
+    low = x[0]
+    high = x[0]
+    whole = count - count % lanes()
+    if whole > 0:
+        above = load(x, 0)
+        below = zero() - above
+        for i in range(lanes(), whole, lanes()):
+            above = larger(load(x, i), above)
+            below = larger(zero() - load(x, i), below)
+        low = -largest(below)
+        high = largest(above)
+    for i in range(whole, count):
+        low = min(low, x[i])
+        high = max(high, x[i])
+    return low, high
+
+
+@part
+def fill_law(code, p, curves, t, value, low, high, mode, node, power):
+    """Force and energy of a law that is a polynomial (`Modes.degree`), by powers of (x - middle) / half.
+
+    In:
+      code, p (8,), curves: the law, and numbers of all laws.
+      t, value: time (s), and the law's tabulated force then (N).
+      low, high: between which elongations they are wanted (m).
+      mode: the mode.
+    Out:
+      power (2 or more, 5 or more): coefficients of the force and of the energy.
+      node (2 or more, 5 or more): scratch.
+
+    Returns the middle of the elongations, the inverse of half their range, the slope of the force by the rate, and how
+    many coefficients there are.
+    """
+    middle = 0.5 * (low + high)
+    half = max(0.5 * (high - low), 1e-6 * (1.0 + abs(middle)))
+    five = np.int64(0) if law_degree(code) == 1 else np.int64(1)
+    places = 5 if five == 1 else 3
+    by_rate = 0.0
+    for m in range(places):
+        f, _, by_rate, energy, _ = law(
+            code, p, middle + half * PLACE[five, m], 0.0, mode, t, value, curves, 1.0
+        )  # fmt: skip
+        node[0, m] = f
+        node[1, m] = energy
+    for a in range(places):
+        force = 0.0
+        stored = 0.0
+        for m in range(places):
+            force += FROM_PLACES[five, a, m] * node[0, m]
+            stored += FROM_PLACES[five, a, m] * node[1, m]
+        power[0, a] = force
+        power[1, a] = stored
+    return middle, 1.0 / half, by_rate, places
+
+
+@part
+def at_places(power, places, s):
+    """The polynomial with so many coefficients, at a vector s."""
+    value = zero() + power[places - 1]
+    for a in range(places - 2, -1, -1):
+        value = value * s + power[a]
+    return value
+
+
+@kernel
+def add_polynomial(code, p, curves, t, value, weight, works, count, mode, node, power, price):
+    """Add what members in one mode do at a state: force times virtual change, and energy times the weight there.
+
+    Of a law that is a polynomial (`Modes.degree`), from few of its values.
+
+    In:
+      code, p (8,), curves: the law, and numbers of all laws.
+      t, value, weight: time (s), the law's tabulated force then (N), and the weight of the energy.
+      works (WORKS, count or more): what members do there, of `member_works`, elongations less permanent sets.
+      count: how many there are; a whole number of vectors may be read.
+      mode: that they are in.
+    Out:
+      price (count, to whole vectors): added to.
+      node, power (2 or more, 5 or more): scratch.
+    """
+    x = works[ELONGATION]
+    low, high = range_of(x, count)
+    middle, inverse, by_rate, places = fill_law(code, p, curves, t, value, low, high, mode, node, power)
+    for a in range(places):
+        power[1, a] *= weight
+    for i in range(0, count, lanes()):
+        s = (load(x, i) - middle) * inverse
+        work = (at_places(power[0], places, s) + by_rate * load(works[RATE], i)) * load(works[ALONG], i)
+        if weight != 0.0:
+            work += where_larger(load(works[INVERSE], i), 0.0, at_places(power[1], places, s))
+        store(price, i, load(price, i) + work)
+
+
+@kernel
+def add_pieces(code, p, curves, t, value, weight, works, count, node, power, price):
+    """What `add_polynomial` does of members in any of the modes of a law whose modes are pieces of one function, which
+    follow each other along the elongation.
+
+    code, p, curves, t, value, weight, works, count, node, power, price: as there.
+    """
+    x = works[ELONGATION]
+    low, high = range_of(x, count)
+    last = np.int64(law_start(code, p, high, 0.0, 0.0, t, curves, 1.0))
+    # before the first piece there is no other, and behind the last one
+    begin = -np.inf
+    for mode in range(np.int64(law_start(code, p, low, 0.0, 0.0, t, curves, 1.0)), last + 1):
+        end = np.inf if mode == last else high + law_margin(code, p, high, 0.0, mode, t, curves, 1.0)
+        # over its own part of the elongations: a steep piece is large beyond it
+        least = max(low, begin)
+        most = max(min(high, end), least)
+        middle, inverse, by_rate, places = fill_law(code, p, curves, t, value, least, most, mode, node, power)
+        for i in range(0, count, lanes()):
+            own = load(x, i)
+            s = (own - middle) * inverse
+            work = (at_places(power[0], places, s) + by_rate * load(works[RATE], i)) * load(works[ALONG], i)
+            work += weight * at_places(power[1], places, s)
+            work = where_larger(load(works[INVERSE], i), 0.0, work)
+            # that of members behind the end of the piece is taken away again, to the bit
+            within = where_larger(own, begin, work) - where_larger(own, end, work)
+            store(price, i, load(price, i) + within)
+        begin = end
+
+
+@kernel
+def add_in_mode(code, p, curves, t, value, weight, free, works, mode, price):
+    """What `add_polynomial` does of any law, member by member.
+
+    code, p, curves, t, value, weight, works, mode, price: as there, of as many members as there are prices.
+    free (count,): free lengths (m).
+    """
+    for i in range(price.shape[0]):
+        if works[INVERSE, i] != 0.0:
+            f, _, _, energy, _ = law(
+                code, p, works[ELONGATION, i], works[RATE, i], mode, t, value, curves, free[i]
+            )  # fmt: skip
+            price[i] += f * works[ALONG, i] + weight * energy
+
+
+@kernel
+def _first_mode(model, candidates, k, i, s, node):
+    """The mode of member i at the first node of a step, where that depends on its second derivative.
+
+    model: with the members.
+    candidates, k: a `PricedCandidates`, and the number of the run.
+    i, s: numbers of the member and of the step.
+    node (NODE_ROWS, NODES): the member at the nodes.
+    """
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    first = candidates.step[s, FIRST_NODE]
+    r = candidates.node_pose[first]
+    length, _, _ = member_motion(model, i, r)
+    second = second_rate(model, i, r, candidates.node_a[first]) if length > 0.0 else 0.0
+    return np.int64(
+        law_start(
+            candidates.run[k, CODE], candidates.law[k], node[ELONGATION, 0], node[RATE, 0], second,
+            candidates.step_time[s, 0], model.curves, rest,
+        )
+    )  # fmt: skip
+
+
+@part
+def _first_over(code, p, curves, rest, time, node, begin, mode, kept):
+    """The first node behind a fraction of a step at which a mode has ended; NODES where it has at none.
+
+    code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+    time (2,): start and length of the step (s).
+    node (NODE_ROWS, NODES): the member there, of which ELONGATION and RATE count.
+    begin: the fraction.
+    mode, kept: the mode, and the permanent set (m).
+    """
+    for m in range(1, NODES):
+        if NODE[m] > begin:
+            t = time[0] + NODE[m] * time[1]
+            if law_margin(code, p, node[ELONGATION, m] - kept, node[RATE, m], mode, t, curves, rest) < 0.0:
+                return m
+    return NODES
+
+
+@part
+def _fill_power(values, power):
+    """power (NODES,): coefficients of the polynomial through values (NODES,) at the nodes, as of POWERS."""
+    for a in range(NODES):
+        w = POWERS[a]
+        power[a] = (
+            (w[0] * values[0] + w[1] * values[1])
+            + (w[2] * values[2] + w[3] * values[3])
+            + (w[4] * values[4] + w[5] * values[5])
+        )
+
+
+@part
+def polynomial(power, c):
+    """The polynomial with coefficients as of POWERS at a fraction c of a step."""
+    u = 2.0 * c - 1.0
+    square = u * u
+    return (power[0] + power[1] * u) + square * ((power[2] + power[3] * u) + square * (power[4] + power[5] * u))
+
+
+@part
+def _slope(power, c):
+    """Its slope by the fraction."""
+    u = 2.0 * c - 1.0
+    value = 0.0
+    for m in range(NODES - 1, 0, -1):
+        value = value * u + m * power[m]
+    return 2.0 * value
+
+
+@part
+def _margin(code, p, curves, rest, time, power, c, mode, kept):
+    """How far a mode is from its end at a fraction c of a step.
+
+    code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+    time (2,): start and length of the step (s). power (NODE_ROWS, NODES): coefficients of ELONGATION and RATE.
+    mode, kept: the mode, and the permanent set (m).
+    """
+    x = polynomial(power[ELONGATION], c) - kept
+    return law_margin(code, p, x, polynomial(power[RATE], c), mode, time[0] + c * time[1], curves, rest)
+
+
+@part
+def _located(code, p, curves, rest, time, power, lower, upper, mode, kept):
+    """The fraction of a step at which a mode has just ended.
+
+    Regula falsi, which halves the value at an end that stays (Illinois), and the interval where three turns have not
+    left a quarter of it.
+
+    code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+    time (2,): start and length of the step (s). power (NODE_ROWS, NODES): coefficients of ELONGATION and RATE.
+    lower, upper: fractions at which the mode has not ended, and has.
+    mode, kept: the mode, and the permanent set (m).
+    """
+    before = _margin(code, p, curves, rest, time, power, lower, mode, kept)
+    behind = _margin(code, p, curves, rest, time, power, upper, mode, kept)
+    turn = 0
+    side = 0
+    halve = False
+    wide = upper - lower
+    while upper - lower > LOCATED:
+        c = lower + (upper - lower) * before / (before - behind)
+        if halve or not lower <= c <= upper:
+            c = 0.5 * (lower + upper)
+        c = min(max(c, lower + 0.5 * LOCATED), upper - 0.5 * LOCATED)
+        value = _margin(code, p, curves, rest, time, power, c, mode, kept)
+        if value < 0.0:
+            upper = c
+            behind = value
+            before *= 0.5 if side < 0 else 1.0
+            side = -1
+        else:
+            lower = c
+            before = value
+            behind *= 0.5 if side > 0 else 1.0
+            side = 1
+        halve = False
+        turn += 1
+        if turn == 3:
+            halve = upper - lower > 0.25 * wide
+            wide = upper - lower
+            turn = 0
+    return upper
+
+
+@part
+def _follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
+    """The modes that a member goes through in a step.
+
+    In:
+      code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+      time (2,): start and length of the step (s).
+      mode, kept: those with which it begins.
+      node (NODE_ROWS, NODES): ELONGATION and RATE of the member.
+    Out:
+      power (NODE_ROWS, NODES): coefficients of these, unless it stays in its mode.
+      pieces (CHANGES + 1, PIECE): set.
+
+    Returns the number of the last piece.
+    """
+    pieces[0, BEGIN] = 0.0
+    pieces[0, PIECE_MODE] = mode
+    pieces[0, PIECE_SET] = kept
+    last = np.int64(0)
+    while last < CHANGES:
+        begin = pieces[last, BEGIN]
+        mode = np.int64(pieces[last, PIECE_MODE])
+        kept = pieces[last, PIECE_SET]
+        over = _first_over(code, p, curves, rest, time, node, begin, mode, kept)
+        if over == NODES:
+            return last
+        if last == 0:
+            _fill_power(node[ELONGATION], power[ELONGATION])
+            _fill_power(node[RATE], power[RATE])
+        lower = max(begin, NODE[over - 1])
+        upper = NODE[over]
+        if _margin(code, p, curves, rest, time, power, lower, mode, kept) >= 0.0:
+            upper = _located(code, p, curves, rest, time, power, lower, upper, mode, kept)
+        else:
+            upper = lower
+        x = polynomial(power[ELONGATION], upper) - kept
+        rate = polynomial(power[RATE], upper)
+        second = _slope(power[RATE], upper) / time[1]
+        new = law_next(code, p, x, rate, second, mode, time[0] + upper * time[1], curves, rest)
+        if new == mode:
+            return last
+        last += 1
+        pieces[last, BEGIN] = upper
+        pieces[last, PIECE_MODE] = new
+        pieces[last, PIECE_SET] = kept + law_set(code, p, x, mode, new)
+    return last
+
+
+@part
+def _over_pieces(code, p, curves, rest, time, level, weight, last, node, power, pieces):
+    """The integral over the pieces of a step of the force of each mode times the member's part of the virtual change,
+    and of its energy times the weight of that.
+
+    In:
+      code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
+      time (2,): start and length of the step (s).
+      level, weight (NODES,): coefficients of the law's tabulated force, and of the weight of the energy.
+      last: number of the last piece.
+      node (NODE_ROWS, NODES): ALONG of the member.
+      pieces (CHANGES + 1, PIECE): of `_follow`.
+    In place:
+      power (NODE_ROWS, NODES): of `_follow`; that of ALONG is set.
+    """
+    _fill_power(node[ALONG], power[ALONG])
+    given = False
+    stored = False
+    for m in range(NODES):
+        given = given or level[m] != 0.0
+        stored = stored or weight[m] != 0.0
+    total = 0.0
+    for at in range(last + 1):
+        mode = np.int64(pieces[at, PIECE_MODE])
+        if law_is_idle(code, mode):
+            continue
+        begin = pieces[at, BEGIN]
+        wide = (pieces[at + 1, BEGIN] if at < last else 1.0) - begin
+        for g in range(GAUSS.shape[1]):
+            c = begin + wide * GAUSS[0, g]
+            value = polynomial(level, c) if given else 0.0
+            f, _, _, energy, _ = law(
+                code, p, polynomial(power[ELONGATION], c) - pieces[at, PIECE_SET], polynomial(power[RATE], c), mode,
+                time[0] + c * time[1], value, curves, rest,
+            )  # fmt: skip
+            work = f * polynomial(power[ALONG], c)
+            if stored:
+                work += energy * polynomial(weight, c)
+            total += wide * GAUSS[1, g] * work
+    return total

@@ -1,0 +1,459 @@
+"""The prices of a tile's members by a law with modes, most of them from those of a few.
+
+A price is a sum over steps. In a step in which bounds show that all members of a part of the tile stay in one mode
+(`certain_modes`), or all leave it for the same other one, what they do is as smooth in where their ends are as by a
+law without modes: it is computed for a few members, and follows for the others (`sensitivity.tile_interpolation`).
+In other steps members are sorted by what they do (`sorted_prices`): those of the whole tile, or of the largest parts
+whose points are evenly spread, where a law does not remember; else of the smallest parts, after all larger ones.
+
+Where a law remembers, steps are gone through in the order of time, with the mode and the permanent set that each member
+has. Once the sets differ, what the members of a part do is a polynomial of the second degree in their sets, too.
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel
+from mdstopo.general.model.priced_candidates import (
+    CODE,
+    FIRST_STAGE,
+    FIRST_STATE,
+    FIRST_STEP,
+    FOLLOWED,
+    FROM_START,
+    KIND,
+    LAST_STAGE,
+    LAST_STATE,
+    LAST_STEP,
+    MODES,
+    MOVES,
+    PIECES,
+    POINT,
+    SCENE,
+    WHOLE,
+)
+from mdstopo.general.pricing.certain_modes import LEAVES, UNSURE, fill_spans, make_spans, modes_at_nodes, modes_in_step
+from mdstopo.general.pricing.loaded_members import add_states, load_all, load_members, loaded_at
+from mdstopo.general.pricing.sorted_members import make_sorting, modes_of_all
+from mdstopo.general.pricing.sorted_prices import LOADED, NO_LEVEL, price_part
+from mdstopo.general.pricing.switching_prices import ROW, add_pieces, make_following, price_point, price_step
+from mdstopo.general.pricing.switching_together import make_switching
+from mdstopo.mechanics.kinematics.kinematics_interface import WORKS, member_works
+from mdstopo.mechanics.laws.law_table import law_is_idle, law_remembers
+from mdstopo.sensitivity.tile_interpolation import (
+    BROAD,
+    LEVELS,
+    PARTS,
+    PLACES,
+    PRICED,
+    SHORT,
+    TALL,
+    begin_part,
+    extent,
+    next_candidates,
+    number_candidates,
+    take_prices,
+)
+
+#: parts of a tile of all levels that have lists, of which those of a level begin at 2^level - 1
+LISTED_PARTS = 2**LEVELS - 1
+#: of each part: the mode that all its members are in, UNSURE where they differ; their least and largest permanent sets
+SHARED = 3
+SAME, LEAST, MOST = range(SHARED)
+#: sets at which a part whose members differ in these is priced
+SETS = 3
+
+
+@kernel
+def make_lists(candidates):
+    """What `price_run` needs of its own, for all runs of some candidates.
+
+    Returns numbers of steps, and what is known of each, by parts; how many these are; SHARED of parts; modes and
+    permanent sets, and behind a part of a step; which of the smallest parts are not listed, and whether members are
+    loaded; prices; what members of a step end with; all places of a tile; what members do at a state.
+    """
+    most = candidates.step.shape[0] + candidates.pose.shape[0] + 1
+    return (
+        np.zeros((LISTED_PARTS, most), np.int64),
+        np.zeros((LISTED_PARTS, most), np.int64),
+        np.zeros(LISTED_PARTS, np.int64),
+        np.zeros((LISTED_PARTS, SHARED)),
+        np.zeros((2, PLACES), np.int64),
+        np.zeros((2, PLACES)),
+        np.zeros(PARTS + 1, np.int64),
+        np.zeros((SETS, PLACES)),
+        np.zeros(PLACES),
+        np.zeros((2, PLACES), np.int64),
+        np.zeros((WORKS, PLACES)),
+    )
+
+
+@kernel
+def price_run(model, candidates, k, tile, scratch, lists, price):
+    """Add what the members of a tile do by one law with modes.
+
+    In:
+      model: with room for 2 PLACES members, which are overwritten.
+      candidates, k: a `PricedCandidates`, and the number of the run.
+      tile: grids, i, j and error as of `tile_interpolation.take_prices`.
+    In place:
+      price (PLACES,): of its candidates.
+    Scratch:
+      scratch: of `tile_interpolation.make_scratch`.
+      lists: of `make_lists`.
+
+    Returns how many prices were computed, of steps as parts of one.
+    """
+    run = candidates.run[k]
+    spans = make_spans(candidates.first.shape[1])
+    buffers = (scratch, lists, spans, make_following(), make_sorting(), make_switching())
+    _, i, j, _ = tile
+    _, _, count, shared, modes, sets, todo, _, _, _, _ = lists
+    for n in range(candidates.curves.shape[1]):
+        model.curves[n] = candidates.curves[run[SCENE], n]
+    fill_spans(candidates, k, i, j, spans)
+    count[:] = 0
+    modes[:] = 0
+    sets[:] = 0.0
+    shared[:] = 0.0
+    todo[LOADED] = 0
+    followed = run[MODES] == FOLLOWED
+    steps = run[LAST_STEP] - run[FIRST_STEP] if followed else run[LAST_STATE] - run[FIRST_STATE]
+    begun = run[FROM_START] == 0
+    # where members that remember are at a state alone: behind a part of a step, or behind the last step
+    ends = np.int64(0)
+    done = 0.0
+    for u in range(steps):
+        if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, MOVES] == 0:
+            continue
+        if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
+            done += _price_sorted(model, candidates, k, u, tile, buffers, price)
+            continue
+        done += _price_next(model, candidates, k, u, begun, ends, tile, buffers, price)
+        if followed and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
+            ends = np.int64(candidates.step[run[FIRST_STEP] + u, KIND] != WHOLE)
+            begun = begun or ends == 0
+    for part in range(LISTED_PARTS):
+        done += _price_list(model, candidates, k, part, tile, buffers, price)
+    return done / max(steps, 1)
+
+
+@kernel
+def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
+    """Go through a step: list it for the parts of which enough is known, and follow all other members.
+
+    In:
+      model, candidates, k, tile: as of `price_run`.
+      u: the step, as of `certain_modes.modes_in_step`.
+      begun: whether members are in modes.
+      ends: 1 where the last step was a part of one, and those of states alone are in `modes[1]`; else 0.
+    In place:
+      buffers: of `make_scratch`, `make_lists`, `make_spans`, `make_following`, `make_sorting` and `make_switching`, of
+        which the lists matter.
+      price (PLACES,): added to.
+
+    Returns how many prices of steps were computed now; those of listed steps come later.
+    """
+    run = candidates.run[k]
+    remembers = law_remembers(run[CODE])
+    grids, i, j, _ = tile
+    _, lists, spans, _, _, _ = buffers
+    step, told, count, shared, modes, sets, todo, _, _, _, _ = lists
+    followed = run[MODES] == FOLLOWED
+    kind = candidates.step[run[FIRST_STEP] + u, KIND] if followed else np.int64(POINT)
+    counts = not followed or candidates.step[run[FIRST_STEP] + u, MOVES] != 0
+    height, width = extent(grids, i, j)
+    todo[:LOADED] = 1
+    changed = False
+    done = 0.0
+    level = np.int64(0)
+    while level < LEVELS and not (remembers and kind == POINT):
+        size = BROAD >> level
+        for at in range(1 << level):
+            smallest = at * (size // SHORT)
+            if (at + 1) * size > width or todo[smallest] == 0:
+                continue
+            part = (1 << level) - 1 + at
+            mode = np.int64(-1)
+            if remembers and begun:
+                mode = np.int64(shared[part, SAME])
+                if mode < 0:
+                    continue
+            known, after = modes_in_step(
+                model, candidates, k, u, part, mode, shared[part, LEAST], shared[part, MOST], spans
+            )
+            if known == UNSURE:
+                continue
+            idle = known >= 0 and law_is_idle(run[CODE], known)
+            if not idle and grids[3][level, j * PARTS + smallest] == 0:
+                continue
+            todo[smallest : smallest + size // SHORT] = 0
+            if counts and not idle:
+                step[part, count[part]] = u
+                told[part, count[part]] = known
+                count[part] += 1
+            if remembers and (kind != WHOLE or not begun or known < 0):
+                _enter(modes[0 if kind == WHOLE else 1], at * size, size, after)
+                if kind != WHOLE:
+                    _copy_sets(sets, at * size, size)
+                changed = changed or kind == WHOLE
+        level += 1
+    for smallest in range(PARTS):
+        if todo[smallest] != 0 and smallest * SHORT < width:
+            done += _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, price)
+            changed = changed or (remembers and kind == WHOLE)
+    if changed:
+        _share(modes[0], sets[0], height, shared)
+    return done
+
+
+@kernel
+def _price_sorted(model, candidates, k, u, tile, buffers, price):
+    """Go through a step by a law that does not remember: list it for the parts of which all members stay in a mode, and
+    price other parts by what their members do.
+
+    model, candidates, k, tile, buffers, price: as of `_price_next`.
+    u: the step, by its number among those of the run.
+
+    Returns how many prices of steps were computed.
+    """
+    grids, i, j, _ = tile
+    _, lists, spans, _, sorting, _ = buffers
+    step, told, count, _, _, _, todo, _, _, _, _ = lists
+    mode = sorting[3]
+    _, width = extent(grids, i, j)
+    s = candidates.run[k, FIRST_STEP] + u
+    todo[:LOADED] = 1
+    yes = np.bool_(True)
+    no = np.bool_(False)
+    done = 0.0
+    for level in range(LEVELS):
+        size = BROAD >> level
+        for at in range(1 << level):
+            smallest = at * (size // SHORT)
+            if (at + 1) * size > width or todo[smallest] == 0 or grids[3][level, j * PARTS + smallest] == 0:
+                continue
+            part = (1 << level) - 1 + at
+            todo[smallest : smallest + size // SHORT] = 0
+            modes_at_nodes(model, candidates, k, s, part, spans, mode)
+            old, new = modes_of_all(mode)
+            if old == UNSURE or old != new:
+                done += price_part(model, candidates, k, s, level, at * size, size, yes, no, tile, buffers, price)
+            elif not law_is_idle(candidates.run[k, CODE], old):
+                step[part, count[part]] = u
+                told[part, count[part]] = old
+                count[part] += 1
+    for smallest in range(PARTS):
+        first = smallest * SHORT
+        last = min(first + SHORT, width)
+        if todo[smallest] != 0 and first < width:
+            level = np.int64(LEVELS - 1 if last - first == SHORT else NO_LEVEL)
+            done += price_part(model, candidates, k, s, level, first, last - first, no, no, tile, buffers, price)
+    return done
+
+
+@kernel
+def _enter(modes, first, size, mode):
+    """Write the mode of the members of so many columns from one on; modes (PLACES,): of all."""
+    for a in range(TALL):
+        for b in range(first, first + size):
+            modes[a * BROAD + b] = mode
+
+
+@kernel
+def _copy_sets(sets, first, size):
+    """Of so many columns from one on: a part of a step that makes no set ends with those with which it begins."""
+    for a in range(TALL):
+        for b in range(first, first + size):
+            sets[1, a * BROAD + b] = sets[0, a * BROAD + b]
+
+
+@kernel
+def _share(modes, sets, height, shared):
+    """What the members of each part have in common.
+
+    In:
+      modes, sets (PLACES,): of all.
+      height: rows of the tile.
+    Out:
+      shared (LISTED_PARTS, SHARED): set.
+    """
+    first = PARTS - 1
+    for c in range(PARTS):
+        mode = modes[c * SHORT]
+        low = sets[c * SHORT]
+        high = low
+        for a in range(height):
+            for b in range(c * SHORT, (c + 1) * SHORT):
+                at = a * BROAD + b
+                low = min(low, sets[at])
+                high = max(high, sets[at])
+                if modes[at] != mode:
+                    mode = np.int64(UNSURE)
+        shared[first + c, SAME] = mode
+        shared[first + c, LEAST] = low
+        shared[first + c, MOST] = high
+    for part in range(first - 1, -1, -1):
+        one = shared[2 * part + 1]
+        other = shared[2 * part + 2]
+        shared[part, SAME] = one[SAME] if one[SAME] == other[SAME] else UNSURE
+        shared[part, LEAST] = min(one[LEAST], other[LEAST])
+        shared[part, MOST] = max(one[MOST], other[MOST])
+
+
+@kernel
+def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, price):
+    """Follow the members of one of the smallest parts through a step.
+
+    Where permanent sets become others, what is listed is priced first, with those that were.
+
+    model, candidates, k, u, begun, ends, tile, buffers, price: as of `_price_next`.
+    smallest: the number of the part among those of its level.
+
+    Returns how many prices of steps were computed now, those of listed steps among them.
+    """
+    run = candidates.run[k]
+    grids, i, j, _ = tile
+    lists = buffers[1]
+    modes, sets, todo, fresh, whole = lists[4], lists[5], lists[6], lists[8], lists[9]
+    height, width = extent(grids, i, j)
+    if todo[LOADED] == 0:
+        load_all(model, candidates, k, grids, i, j, whole)
+        todo[LOADED] = 1
+    first = smallest * SHORT
+    wide = min(SHORT, width - first)
+    s = run[FIRST_STEP] + u
+    if run[MODES] == PIECES:
+        _add_by_pieces(model, candidates, k, run[FIRST_STATE] + u, first, wide, height, buffers, price)
+        return 1.0 * height * wide
+    kind = candidates.step[s, KIND]
+    if kind == POINT:
+        for a in range(height):
+            for b in range(a * BROAD + first, a * BROAD + first + wide):
+                started = begun or ends != 0
+                member = loaded_at(b)
+                price[b] += price_point(model, candidates, k, member, s, modes[ends, b], sets[ends, b], started)
+        return 1.0 * height * wide
+    no = np.bool_(False)
+    followed = price_part(model, candidates, k, s, np.int64(NO_LEVEL), first, wide, no, begun, tile, buffers, price)
+    changed = False
+    for a in range(height):
+        for b in range(a * BROAD + first, a * BROAD + first + wide):
+            changed = changed or fresh[b] != sets[0, b]
+    if changed and kind == WHOLE and wide == SHORT:
+        for level in range(LEVELS):
+            part = (1 << level) - 1 + first // (BROAD >> level)
+            followed += _price_list(model, candidates, k, part, tile, buffers, price)
+    to = np.int64(0) if kind == WHOLE else np.int64(1)
+    for a in range(height):
+        for b in range(a * BROAD + first, a * BROAD + first + wide):
+            sets[to, b] = fresh[b]
+    return followed
+
+
+@kernel
+def _add_by_pieces(model, candidates, k, o, first, wide, height, buffers, price):
+    """Add what the members of some columns do at a state by a law whose modes are pieces of one function.
+
+    model, candidates, k, buffers, price: as of `_price_next`.
+    o: the state.
+    first, wide: the first column, and how many there are, SHORT at most.
+    height: rows of the tile.
+    """
+    scratch, lists, _, following, _, _ = buffers
+    works = lists[10]
+    values = scratch[5]
+    count = wide * TALL
+    member_works(model, PLACES + first * TALL, count, candidates.pose[o, 0], candidates.change[o, 0], works)
+    values[:count] = 0.0
+    add_pieces(
+        candidates.run[k, CODE], candidates.law[k], model.curves, candidates.when[o], candidates.level[o],
+        candidates.energy[o], works, count, following[0], following[1], values,
+    )  # fmt: skip
+    for a in range(height):
+        for b in range(wide):
+            price[a * BROAD + first + b] += values[b * TALL + a]
+
+
+@kernel
+def _price_list(model, candidates, k, part, tile, buffers, price):
+    """Price the steps that are listed for a part, which has none in its list then.
+
+    model, candidates, k, tile, buffers, price: as of `_price_next`.
+    part: its number.
+
+    Returns how many prices of steps were computed.
+    """
+    grids, i, j, error = tile
+    scratch, lists, _, following, _, _ = buffers
+    _, _, count, shared, _, sets, _, found, _, _, _ = lists
+    plan, _, _, _, index, values, _ = scratch
+    steps = count[part]
+    if steps == 0:
+        return 0.0
+    level = np.int64(0)
+    while (2 << level) - 1 <= part:
+        level += 1
+    size = BROAD >> level
+    first = (part - ((1 << level) - 1)) * size
+    low = shared[part, LEAST]
+    high = shared[part, MOST]
+    done = 0.0
+    for n in range(1 if low == high else SETS):
+        begin_part(level, first, scratch)
+        while next_candidates(grids, i, j, scratch):
+            members = number_candidates(i, j, scratch)
+            load_members(model, candidates, k, index, members, np.int64(0))
+            values[:members] = 0.0
+            _price_few(model, candidates, k, part, low + 0.5 * n * (high - low), members, lists, following, values)
+            take_prices(grids, i, j, error, scratch, found[n])
+        done += plan[PRICED]
+    height, _ = extent(grids, i, j)
+    for a in range(height):
+        for at in range(a * BROAD + first, a * BROAD + first + size):
+            value = found[0, at]
+            if high != low:
+                t = 2.0 * (sets[0, at] - low) / (high - low) - 1.0
+                value = 0.5 * t * ((t - 1.0) * value + (t + 1.0) * found[2, at]) + (1.0 - t * t) * found[1, at]
+            price[at] += value
+    count[part] = 0
+    return done * steps
+
+
+@kernel
+def _price_few(model, candidates, k, part, kept, members, lists, following, values):
+    """Add what some members do in the steps that are listed for a part.
+
+    In:
+      model: with the members.
+      candidates, k: a `PricedCandidates`, and the number of the run.
+      part: its number.
+      kept: the permanent set of the members (m).
+      members: how many there are.
+      lists: of `make_lists`.
+    Out:
+      values (members or more,): added to.
+      following: of `make_following`, overwritten.
+    """
+    run = candidates.run[k]
+    step, told, count, _, _, _, _, _, _, _, works = lists
+    yes = np.bool_(True)
+    for n in range(count[part]):
+        known = told[part, n]
+        s = run[FIRST_STEP] + step[part, n]
+        if known <= LEAVES:
+            following[4][0] = LEAVES - known
+            following[5][0] = kept
+            for at in range(0, members, ROW):
+                wide = min(ROW, members - at)
+                few = values[at : at + wide]
+                price_step(
+                    model, candidates, k, at, wide, s, following[4][0], following[5][0], yes, yes, following, few
+                )
+            continue
+        o = run[FIRST_STATE] + step[part, n]
+        behind = o + 1
+        if run[MODES] == FOLLOWED:
+            o = candidates.step[s, FIRST_STAGE]
+            behind = candidates.step[s, LAST_STAGE]
+        following[5][0, 0] = kept
+        add_states(model, candidates, k, o, behind, members, known, following[5][0, :1], works, following, values)

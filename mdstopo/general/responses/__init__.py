@@ -1,0 +1,1 @@
+"""Values of responses at an instant, their slopes, and the rows that peaks are."""

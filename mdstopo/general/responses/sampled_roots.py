@@ -1,0 +1,78 @@
+"""Zeros of a smooth function of time whose values and rates are known at samples, each found on the function itself."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.scene.springs_model import FloatArray
+
+#: looks at a dip of a function that may pass zero
+TRIALS = 4
+
+
+def may_vanish(values: FloatArray, rates: FloatArray) -> NDArray[np.bool_]:
+    """(..., K - 1): between which samples a smooth function changes its sign, or comes nearer to zero and leaves again.
+
+    values, rates (..., K): of the function at the samples.
+    """
+    left, right = values[..., :-1], values[..., 1:]
+    turns = (left >= 0.0) != (right >= 0.0)
+    dips = (left * rates[..., :-1] < 0.0) & (right * rates[..., 1:] > 0.0)
+    return np.asarray(turns | dips)
+
+
+def roots_between(
+    span: tuple[float, float],
+    values: tuple[float, float],
+    rates: tuple[float, float],
+    exact: Callable[[FloatArray], FloatArray],
+) -> Iterator[float]:
+    """Fractions of a step, between two samples, at which a smooth function of time vanishes.
+
+    span: the fractions of the samples. values: what it is at them. rates: its rates, per interval between them.
+    exact: values (K,) at fractions (K,), on the motion itself.
+    """
+    (low, high), (d0, d1), (s0, s1) = span, values, rates
+
+    def difference(c: float) -> float:
+        return float(exact(np.array([c]))[0])
+
+    if (d0 >= 0.0) != (d1 >= 0.0):
+        yield from _bracketed(difference, low, high)
+        return
+    if not (d0 * s0 < 0.0 < d1 * s1):
+        return
+    # it comes nearer to zero and goes away again: the cubic says where, and whether it may pass zero there
+    square, cube = 3.0 * (d1 - d0) - 2.0 * s0 - s1, s0 + s1 - 2.0 * (d1 - d0)
+    c = -s0 / (square + np.copysign(np.sqrt(max(square * square - 3.0 * cube * s0, 0.0)), d0))
+    dip = d0 + c * (s0 + c * (square + c * cube))
+    if not 0.0 < c < 1.0 or dip * d0 > (0.02 * min(abs(d0), abs(d1)) + 1e-4 * max(abs(s0), abs(s1))) * abs(d0):
+        return
+    c = low + c * (high - low)
+    width = 0.02 * (high - low)
+    for _ in range(TRIALS):
+        near = np.clip(np.array([c - width, c, c + width]), low, high)
+        seen = exact(near)
+        beyond = np.flatnonzero(seen * d0 < 0.0)
+        if len(beyond):
+            middle = float(near[beyond[0]])
+            yield from _bracketed(difference, low, middle)
+            yield from _bracketed(difference, middle, high)
+            return
+        bend = seen[0] - 2.0 * seen[1] + seen[2]
+        if bend == 0.0:
+            return
+        c = float(np.clip(c + 0.5 * width * (seen[0] - seen[2]) / bend, low, high))
+        width *= 0.1
+
+
+def _bracketed(difference: Callable[[float], float], low: float, high: float) -> Iterator[float]:
+    """The root between two fractions at which a difference has two signs, if it has in truth."""
+    from scipy.optimize import brentq
+
+    first, last = difference(low), difference(high)
+    if first * last < 0.0:
+        yield float(brentq(difference, low, high, xtol=1e-15, rtol=1e-14))
+    elif first == 0.0 or last == 0.0:
+        yield low if first == 0.0 else high

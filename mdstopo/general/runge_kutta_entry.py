@@ -1,6 +1,0 @@
-"""What is the explicit methods's own of the entries for general scenes (`entries`)."""
-
-import mdstopo.general.runge_kutta_sensitivity  # noqa: F401  (enters the method's functions)
-from mdstopo.general.runge_kutta import TAG, simulate
-
-__all__ = ["TAG", "simulate"]

@@ -1,0 +1,1 @@
+"""From a case to the arrays of a scene, in a plane and in space."""
