@@ -114,7 +114,7 @@ class Estimator:
 
 def _same_steps(one: Evaluation, other: Evaluation) -> bool:
     """Whether two evaluations differ at most in how far linear iterations were taken."""
-    return all(one.work[name] == other.work[name] for name in one.work if name != "body_sweeps")
+    return all(one.work[name] == other.work[name] for name in one.work if name != "body_iterations")
 
 
 def _difference(found: Evaluation, other: Evaluation, name: str, factor: float = 1.0) -> ErrorEstimate:

@@ -58,7 +58,7 @@ SENSITIVITIES: dict[str, SensitivityKind] = {
         ),
         SensitivityKind(
             "iterative",
-            "the same on the steps of generalized_alpha, by fixed-point sweeps",
+            "the same on the steps of generalized_alpha, by fixed-point iterations",
             f"{_HERE}:by_iterative",
             steps="iterative",
         ),

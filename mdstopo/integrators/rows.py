@@ -1,4 +1,4 @@
-"""States of several nodes as rows of whole vectors: what the sweeps of the Gauss method do over and over.
+"""States of several nodes as rows of whole vectors: what the iterations of the Gauss method do over and over.
 
 A row has n coordinates and zeros after them up to `row_width(n)`, so that loops over coordinates are few instructions
 without remainders.

@@ -5,7 +5,7 @@ On a window the accelerations at the nodes obey a_j = M^-1 F(q_j, v_j, t_j), wit
 
     a_j = M^-1 (F_j - K_j (q_j(a) - q_j) - C_j (v_j(a) - v_j))
 
-is solved by sweeps that touch no member (they contract quickly because h^2 |K/M| |A|^2 is small on the windows chosen
+is solved by iterations that touch no member (they contract quickly: h^2 |K/M| |A|^2 is small on the windows chosen
 here). The first pass has seven nodes; every further one takes more, until the Legendre coefficients of a have decayed
 below the tolerance, and goes on at that number until the Newton correction is. So the corrections and the tail of the
 coefficients are the error estimate, at no cost. The last correction is solved for but not passed over once more, so
@@ -74,7 +74,7 @@ COUNTS = LEVELS
 MOST = max(LEVELS)
 #: level of every first pass, and of all passes of a fixed step: seven nodes, order 14
 FIRST_LEVEL = 0
-#: radians of the fastest vibration that the first window may span, so that the sweeps contract
+#: radians of the fastest vibration that the first window may span, so that the iterations contract
 LONGEST = 6.0
 #: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
 SLOW = 0.26

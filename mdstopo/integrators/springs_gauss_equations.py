@@ -1,4 +1,4 @@
-"""The linearised balance of a window of Gauss collocation, solved by sweeps that touch no member.
+"""The linearised balance of a window of Gauss collocation, solved by iterations that touch no member.
 
     a_j = M^-1 (F_j - K_j (q_j(a) - q_j) - C_j (v_j(a) - v_j))
 
@@ -20,7 +20,7 @@ from mdstopo.integrators.rows import (
     subtract_rows,
     take_rows,
 )
-from mdstopo.integrators.steps import SWEEPS
+from mdstopo.integrators.steps import BODY_ITERATIONS
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,
@@ -46,7 +46,7 @@ def solve_nodes(
     pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, alike, weight, accuracy, ref, a,
     q, v, work,
 ):  # fmt: skip
-    """Solve the linearised balance of a window for the accelerations at its nodes by sweeps. Rows as in `rows`.
+    """Solve the linearised balance of a window for the accelerations at its nodes by iterations. Rows as in `rows`.
 
     In:
       pair (n_pair, 2): the bodies of each pair.
@@ -71,7 +71,7 @@ def solve_nodes(
       q, v (s or more, W): the states at the nodes that belong to a.
       work (WORK,): counts of work, added to.
 
-    Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
+    Returns the relative correction of the states against ref, or -1 where the iterations do not contract.
     """
     k = own.K
     c = own.C
@@ -96,20 +96,20 @@ def solve_nodes(
     second = planes[2]
     # what the linearisation is off by grows with the square of what it corrects; a prediction is off by more
     share = 1e-2 if alike else 1e-3
-    # what rounding of the positions leaves in a sweep's change, where bodies move by little of where they are
+    # what rounding of the positions leaves in an iteration's change, where bodies move by little of where they are
     rounding = 1e-13
     for d in range(q0.shape[0]):
         rounding = max(rounding, min(1e-14 * weight[d] * abs(q0[d]), 1e-6))
     correction = 0.0
     last = np.inf
     growing = 0
-    for sweep in range(81):
+    for iteration in range(81):
         change = move_to_nodes(second, s, h * h, q0, hv0, nodes, a, weight, q_ref, q, dx)
         if damped:
             integrate_to_nodes(first, s, s, h, v0, none, nodes, a, v)
-        if sweep > 0:
-            work[SWEEPS] += 1
-            if sweep == 1:
+        if iteration > 0:
+            work[BODY_ITERATIONS] += 1
+            if iteration == 1:
                 correction = largest_difference(q, q_ref, weight, s)
             if not change <= 1e8:
                 return -1.0
@@ -117,7 +117,7 @@ def solve_nodes(
             if change <= enough or (change >= last and change < rounding):
                 break
             growing = growing + 1 if change >= last else 0
-            if growing >= 3 or sweep == 80:
+            if growing >= 3 or iteration == 80:
                 return -1.0
             last = change
         if dense:

@@ -1,7 +1,7 @@
 """Gauss collocation, linearised: dense output, the reverse step (`steps_interface`).
 
 Both work on the stages that `springs_gauss` kept. The reverse step solves the transposed linear balance of a window by
-sweeps that contract as the forward ones did.
+iterations that contract as the forward ones did.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from mdstopo.integrators.rows import (
 )
 from mdstopo.integrators.springs_gauss import COUNTS, TAG, GaussSteps
 from mdstopo.integrators.springs_gauss_equations import accelerations_vjp, dense_rows, fill_dense
-from mdstopo.integrators.steps import FIRST, LEVEL, REVERSE, SWEEPS, Q, V
+from mdstopo.integrators.steps import BODY_ITERATIONS, FIRST, LEVEL, REVERSE, Q, V
 from mdstopo.integrators.steps_interface import implement
 
 
@@ -104,7 +104,7 @@ def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
-    """By sweeps of the window's transposed equations; see `steps_interface.reverse_step`. Not used: lam_x."""
+    """By iterations of the window's transposed equations; see `steps_interface.reverse_step`. Not used: lam_x."""
     level = steps.index[w, LEVEL]
     s = COUNTS[level]
     n = lam_q.shape[0]
@@ -159,7 +159,7 @@ def reverse_step(
             fill_dense(pair, c, turn, np.bool_(False), inverse, s, np.bool_(True), dense[1])
     last = np.inf
     for _ in range(200):
-        work[SWEEPS] += 1
+        work[BODY_ITERATIONS] += 1
         accelerations_vjp(pair, k, c, turn, dense, inverse, x, s, damped, turning, z_row, u, y)
         if damped:
             combine_rows(back_v, s, s, h, rhs, y, value)

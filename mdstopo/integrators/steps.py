@@ -37,22 +37,22 @@ _STATUS = {
 }
 
 #: positions in the array of work counts: states at which forces were summed, those of them with tangents, accepted
-#: and rejected steps, Newton corrections, body-level sweeps, reverse steps, states in design gradient passes, and, in
-#: scenes of springs, members that were summed over all states
-FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, SWEEPS, REVERSE, DESIGN, SPRINGS = range(9)
+#: and rejected steps, Newton corrections, body-level iterations, reverse steps, states in design gradient passes, and,
+#: in scenes of springs, members that were summed over all states
+FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, BODY_ITERATIONS, REVERSE, DESIGN, SPRINGS = range(9)
 #: in general scenes, what of FORCES was not for the stages of steps: at the start and behind switches and breakpoints;
 #: steps that were rejected; where within a step a member switches; samples of responses; states inside steps and
 #: responses there, as at peaks
 OF_STARTS, OF_REJECTED, OF_SWITCHES, OF_SAMPLES, OF_POINTS = range(9, 14)
 #: of explicit methods, the accepted steps that were held short by stability (`decay_rate`); of windows of collocation
-#: of general scenes those that were tried and too long for their sweeps to contract
+#: of general scenes those that were tried and too long for their iterations to contract
 HELD_SHORT = 14
 WORK = 15
 
 
 def work_named(counts: Sequence[int]) -> dict[str, int]:
     """Counts of work (WORK,) by their names."""
-    forces, tangents, accepted, rejected, newton, sweeps, reverse, design, springs = counts[:OF_STARTS]
+    forces, tangents, accepted, rejected, newton, iterations, reverse, design, springs = counts[:OF_STARTS]
     starts, lost, switches, samples, points, held = counts[OF_STARTS:]
     return {
         "force_sums": forces,
@@ -60,7 +60,7 @@ def work_named(counts: Sequence[int]) -> dict[str, int]:
         "steps": accepted,
         "rejected_steps": rejected,
         "newton_corrections": newton,
-        "body_sweeps": sweeps,
+        "body_iterations": iterations,
         "reverse_steps": reverse,
         "design_states": design,
         "spring_states": springs,

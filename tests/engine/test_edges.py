@@ -44,6 +44,6 @@ def test_table_rows_that_differ_by_rounding_are_one_kink(second):
 
 def test_the_iterative_method_finds_its_integrator():
     case = read_case(SCENE.format(second=0.3, power=1), overrides={"solver.tolerance": 1e-6})
-    exact, swept = mdstopo.evaluate(case), mdstopo.evaluate(case, method="iterative")
+    exact, iterated = mdstopo.evaluate(case), mdstopo.evaluate(case, method="iterative")
     scale = np.abs(exact.gradients["G"]).max()
-    assert np.abs(swept.gradients["G"] - exact.gradients["G"]).max() <= 1e-5 * scale
+    assert np.abs(iterated.gradients["G"] - exact.gradients["G"]).max() <= 1e-5 * scale

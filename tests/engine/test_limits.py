@@ -29,7 +29,7 @@ def test_a_fixed_step_that_resolves_the_motion_is_taken_at_its_word(step):
 
 
 def test_fixed_windows_are_solved_where_rounding_of_the_positions_is_all_that_is_left():
-    # the bodies stand far from the origin for what they move by in a window: sweeps go on and on at that rounding
+    # the bodies stand far from the origin for what they move by in a window: iterations go on and on at that rounding
     scene = random_scene(25, "free_length", "jumps", "power", "preload", "reversed", bodies=9)
     step = (scene["time"]["end"] - 0.05) / 300
     case = read(scene, integrator="gauss", step=step)

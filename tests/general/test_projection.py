@@ -1,10 +1,10 @@
-"""The reverse of the way back onto the joints: sweeps with the factors at hand give what the whole matrix gives."""
+"""The reverse of the way back onto the joints: iterations with the factors at hand give what the whole matrix gives."""
 
 import numpy as np
 import pytest
 
 from mdstopo.general.dynamics.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace
-from mdstopo.general.dynamics.projection import swept
+from mdstopo.general.dynamics.projection import solve_iteratively
 from mdstopo.general.model.general_model import pack_general, unpack_general
 from mdstopo.mechanics.kinematics.planar import turn_bodies
 from tests.compiled import compiled
@@ -12,7 +12,7 @@ from tests.general.test_joint_matrix import MECHANISM, model_of
 
 
 @compiled
-def _swept(ints, floats, h, x, y, jac):
+def _solve_iteratively(ints, floats, h, x, y, jac):
     model = unpack_general(ints, floats)
     workspace = make_workspace(model)
     turn_bodies(model, model.q0, workspace.turned)
@@ -20,7 +20,7 @@ def _swept(ints, floats, h, x, y, jac):
     w = workspace
     factor_matrix(model, w, w.k, w.c, w.turn, w.mass, 0.0, 0.0, w.tangents[NO_SHIFT], True)
     jac[:] = workspace.jac
-    return swept(model, workspace, h, x, y)
+    return solve_iteratively(model, workspace, h, x, y)
 
 
 @pytest.mark.parametrize(("size", "settles"), [(0.0, True), (1e-6, True), (1e-3, True), (1e2, False)])
@@ -31,7 +31,7 @@ def test_sweeps_solve_with_small_multipliers_and_say_where_they_do_not(size, set
     h = size * model.mass.min() * rng.normal(size=(len(model.pair), 6, 6))
     right = rng.normal(size=n)
     x, y, jac = right.copy(), np.zeros(n_row), np.zeros((len(model.joint), 3, 6))
-    assert _swept(*pack_general(model), h, x, y, jac) == settles
+    assert _solve_iteratively(*pack_general(model), h, x, y, jac) == settles
     if not settles:
         assert np.array_equal(x, right)
         assert not y.any()

@@ -19,9 +19,9 @@ from mdstopo.status import Status
 if TYPE_CHECKING:
     from mdstopo.general.driver.general_driver import GeneralDriver
 
-#: sweeps of the iterative method before it counts as not contracting, and what is said then
-SWEEPS = 200
-FALLBACK = "the sweeps of the iterative method do not contract at t = {:.6g} s; direct was taken instead"
+#: iterations of the iterative method before it counts as not contracting, and what is said then
+ITERATIONS = 200
+FALLBACK = "the iterations of the iterative method do not contract at t = {:.6g} s; direct was taken instead"
 #: times at which constant_load forms a mean or an integral over time
 NODES = 201
 #: singular values below this times the largest are dropped by constant_load
@@ -54,8 +54,8 @@ def by_direct(
 def by_iterative(
     driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None
 ) -> tuple[FloatArray, str]:
-    """The same by fixed-point sweeps over implicit steps; by `by_direct` where these do not contract."""
-    return _carried(driver, alpha, result, across, SWEEPS)
+    """The same by fixed-point iterations over implicit steps; by `by_direct` where these do not contract."""
+    return _carried(driver, alpha, result, across, ITERATIONS)
 
 
 def by_constant_load(
@@ -83,9 +83,9 @@ def _with_tangents(driver: "GeneralDriver", alpha: FloatArray) -> int:
 
 
 def _carried(
-    driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None, sweeps: int
+    driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None, iterations: int
 ) -> tuple[FloatArray, str]:
-    """As `by_direct`. sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most."""
+    """As `by_direct`. iterations: above 0, implicit stages are solved by so many fixed-point iterations at most."""
     gradients = np.zeros_like(result.gradients)
     count = _with_tangents(driver, alpha)
     wanted = wanted_rows(driver, across is not None)[::-1]
@@ -96,9 +96,9 @@ def _carried(
         for m, each in enumerate(part):
             block.which[m] = each.response, each.is_across
             block.rows[m] = each.at
-        stopped = _push(driver, count, block, 0, sweeps)
+        stopped = _push(driver, count, block, 0, iterations)
         if stopped >= 0:
-            return _without_sweeps(driver, alpha, result, across, stopped)
+            return _by_direct_instead(driver, alpha, result, across, stopped)
         for (j, r, is_across, share, row), own in zip(part, block.out, strict=True):
             _add_since_settled(driver, j, row, bool(is_across), 0, count, own)
             if is_across and across is not None:
@@ -109,33 +109,33 @@ def _carried(
         if reduction.is_integral and result.found[j]:
             integral, row, block = reduction.power, result.rows[j, 0], driver.row_gradients.block(1)
             block.which[0] = j, 0
-            stopped = _push(driver, count, block, integral, sweeps)
+            stopped = _push(driver, count, block, integral, iterations)
             if stopped >= 0:
-                return _without_sweeps(driver, alpha, result, across, stopped)
+                return _by_direct_instead(driver, alpha, result, across, stopped)
             _add_since_settled(driver, j, row, False, integral, count, block.out[0])
             gradients[j, 0] += row.item(RATE) * block.out[0]
     return gradients, ""
 
 
-def _push(driver: "GeneralDriver", count: int, block: Block, integral: int, sweeps: int) -> int:
+def _push(driver: "GeneralDriver", count: int, block: Block, integral: int, iterations: int) -> int:
     """Derivatives of the rows of a block, the earliest first, or of an integral, into its `out`.
 
-    driver, count: with a finished run, and how many steps it has. integral, sweeps: as of `direct.push`.
+    driver, count: with a finished run, and how many steps it has. integral, iterations: as of `direct.push`.
 
-    Returns the step where sweeps did not settle, or -1.
+    Returns the step where iterations did not settle, or -1.
     """
-    arguments = _push_arguments(driver, count, block, integral, sweeps, driver.start_slopes())
+    arguments = _push_arguments(driver, count, block, integral, iterations, driver.start_slopes())
     stopped: int = driver.ready(f"push {len(block.rows)}", driver.entry.push, *arguments)
     return stopped
 
 
 def _push_arguments(
-    driver: "GeneralDriver", count: int, block: Block, integral: int, sweeps: int, slopes: FloatArray
+    driver: "GeneralDriver", count: int, block: Block, integral: int, iterations: int, slopes: FloatArray
 ) -> tuple[Any, ...]:
-    """All arguments of `direct.push`. driver, count, block, integral, sweeps: as of `_push`; slopes (M, n): of the
+    """All arguments of `direct.push`. driver, count, block, integral, iterations: as of `_push`; slopes (M, n): of the
     start."""
     return (
-        *driver.steps_arguments(count), block.which, block.rows, integral, sweeps, driver.room, driver.room_ints,
+        *driver.steps_arguments(count), block.which, block.rows, integral, iterations, driver.room, driver.room_ints,
         driver.member_state, block.padded, block.out, slopes, driver.work,
     )  # fmt: skip
 
@@ -147,10 +147,10 @@ def compile_method(driver: "GeneralDriver", method: str) -> None:
         driver.entry.push.compile(*arguments)
 
 
-def _without_sweeps(
+def _by_direct_instead(
     driver: "GeneralDriver", alpha: FloatArray, result: ResponseResult, across: FloatArray | None, stopped: int
 ) -> tuple[FloatArray, str]:
-    """By `by_direct`, with the sentence that sweeps of the iterative method do not contract in step `stopped`."""
+    """By `by_direct`, with the sentence that iterations of the iterative method do not contract in step `stopped`."""
     message = FALLBACK.format(float(driver.states()[0][stopped]))
     if across is not None:
         across[:] = 0.0

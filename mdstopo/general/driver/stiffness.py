@@ -3,7 +3,7 @@
 A damper or a contact with friction that acts much faster than anything moves lets explicit steps be only so long,
 however little accuracy asks for; the method measures that (`integrators.steps.decay_rate`). Where it holds for most
 steps and for many, implicit ones are fewer by more than each costs. Windows of collocation are held as short, because
-the sweeps that solve their equations do not contract, and each costs more than an explicit step.
+the iterations that solve their equations do not contract, and each costs more than an explicit step.
 """
 
 from typing import TYPE_CHECKING

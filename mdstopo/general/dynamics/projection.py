@@ -44,8 +44,9 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 MISFIT = 1e-7
 #: corrections of the position at most; each squares the misfit
 MOST = 12
-#: sweeps of `swept` at most, and the change of a sweep, relative and weighed by mass, at which they have settled
-SWEEPS, SETTLED = 8, 1e-16
+#: iterations of `solve_iteratively` at most, and the change of an iteration, relative and weighed by mass, at which
+#: they have settled
+ITERATIONS, SETTLED = 8, 1e-16
 
 
 @kernel
@@ -186,14 +187,14 @@ def _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope, shift):
 
 
 @kernel
-def swept(model, workspace, h, x, y):
+def solve_iteratively(model, workspace, h, x, y):
     """Solve [M + H^T, Phi_q^T; Phi_q, 0] iteratively, with the factors for H = 0 that are in the workspace.
 
-    H is as small as what a step has drifted, so few sweeps do. Returns whether they have settled.
+    H is as small as what a step has drifted, so few iterations do. Returns whether they have settled.
 
     h (n_pair, 2 D, 2 D): H by pairs of bodies.
-    x (n,): right side, then the solution; as it was where the sweeps have not settled.
-    y (n_row,): right side of the rows, of the first sweep; zero afterwards.
+    x (n,): right side, then the solution; as it was where the iterations have not settled.
+    y (n_row,): right side of the rows, of the first iteration; zero afterwards.
     """
     n = x.shape[0]
     right = np.empty(n)
@@ -201,7 +202,7 @@ def swept(model, workspace, h, x, y):
     for d in range(n):
         right[d] = x[d]
         last[d] = 0.0
-    for _ in range(SWEEPS):
+    for _ in range(ITERATIONS):
         solve_unknowns(model, workspace, x, y)
         size = 0.0
         change = 0.0
@@ -268,7 +269,7 @@ def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
                     for i in range(pair_freedoms(model)):
                         bar_q[m, place_in_joint(model, j, i)] -= slope[j, r, i] * y[own]
         y[:] = 0.0
-        if not swept(model, workspace, h_mu, bar_q[m], y):
+        if not solve_iteratively(model, workspace, h_mu, bar_q[m], y):
             unsettled[left] = m
             left += 1
     if left > 0:

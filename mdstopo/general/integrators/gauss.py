@@ -423,7 +423,7 @@ def _solve_window(
       segment, t, h: segment of `model.times`, time at the start, and length of the window (s).
       q0 (n_q,), v0 (n,): the state at its start. rel0 (n_pair, POSE): relative poses at the start of the motion.
       motion, noise (n_pair,): how far each pair has moved so far, and what rounding leaves of that (m).
-      tolerance, newton_tolerance, accuracy: of the window, of Newton's corrections, of the sweeps; relative.
+      tolerance, newton_tolerance, accuracy: of the window, of Newton's corrections, of the iterations; relative.
       fixed_step: above 0 there is no control of the error.
       longest: window so far (s).
       balanced: whether node 0 has the balance at the start already.

@@ -1,7 +1,7 @@
 """The interface functions of Gauss collocation in general scenes: the window's polynomial, reverse and tangent steps.
 
-Both solve the linear equations of a window (`gauss_window`), transposed or not, by sweeps that contract as the forward
-ones did, with the slopes that were kept. A window takes over nothing but the state at its start.
+Both solve the linear equations of a window (`gauss_window`), transposed or not, by iterations that contract as the
+forward ones did, with the slopes that were kept. A window takes over nothing but the state at its start.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ from mdstopo.integrators.rows import (
     take_rows,
 )
 from mdstopo.integrators.springs_gauss_linear import _point_weights, _polynomials
-from mdstopo.integrators.steps import REVERSE, SWEEPS
+from mdstopo.integrators.steps import BODY_ITERATIONS, REVERSE
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     window_jvp,
     window_maps,
@@ -45,8 +45,8 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     window_vjp,
 )
 
-#: sweeps at most
-MOST_SWEEPS = 200
+#: iterations of the equations of a window at most
+MOST_ITERATIONS = 200
 
 
 @part
@@ -349,8 +349,8 @@ def _row_back(
     rates = has_rates(model, workspace)
     take_rows(none, s, bar_y)
     last = np.inf
-    for _ in range(MOST_SWEEPS):
-        work[SWEEPS] += 1
+    for _ in range(MOST_ITERATIONS):
+        work[BODY_ITERATIONS] += 1
         _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change, bar_x, bar_y)
         if rates:
             combine_rows(back_y, s, s, h, rhs, bar_y, value)
@@ -415,7 +415,7 @@ def _pull(model, workspace, history, o, s, inverse, maps, dense, none, x, change
 
 
 @kernel
-def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
+def step_forward(tag, model, tables, history, w, c, iterations, dq, dv, dx, force, changes, rows, workspace):
     """Push R changes through window w (`method_interface`).
 
     Constant:
@@ -428,9 +428,9 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
     Out:
       changes (R, s or more, 3, n): changes of the nodes' q, v, a.
 
-    Not needed here: sweeps, dx, rows; of the workspace only its switches.
+    Not needed here: iterations, dx, rows; of the workspace only its switches.
 
-    Returns True: the sweeps that solve the equations are not those of the iterative method.
+    Returns True: the iterations that solve the equations are not those of the iterative method.
     """
     _, s, _ = stages_of(history, w)
     planes = tables[level_of(s)]
@@ -497,7 +497,7 @@ def _row_forward(model, planes, history, w, c, workspace, inverse, maps, dense, 
     take_rows(given, s, du)
     change[:] = 0.0
     last = np.inf
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MOST_ITERATIONS):
         integrate_to_nodes(planes[2], s, s, h * h, none[0], ends[1], planes[0, 0], du, by_x)
         integrate_to_nodes(planes[1], s, s, h, ends[0], none[0], planes[0, 0], du, by_y)
         if dense.shape[2] > 0:

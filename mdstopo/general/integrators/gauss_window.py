@@ -11,8 +11,8 @@ do to G is in it, so the equations between nodes are those of numbers that are a
 
     u_i = g_i + G_x (x_i - x_ref) + G_y (y_i - y_ref),
 
-they are solved by sweeps that touch no member, as are their transposes. Slopes of few bodies are multiplied as dense
-matrices, in whole vectors; of many by pairs, with K, C and the slopes of loads that the history of steps has.
+they are solved by iterations that touch no member, as are their transposes. Slopes of few bodies are multiplied as
+dense matrices, in whole vectors; of many by pairs, with K, C and the slopes of loads that the history of steps has.
 """
 
 from typing import Any
@@ -39,7 +39,7 @@ from mdstopo.integrators.rows import (
     subtract_rows,
     take_rows,
 )
-from mdstopo.integrators.steps import FORCES, SWEEPS, TANGENTS
+from mdstopo.integrators.steps import BODY_ITERATIONS, FORCES, TANGENTS
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     deflection,
     freedoms,
@@ -63,7 +63,7 @@ MOST = max(LEVELS)
 #: freedoms of moving bodies up to which slopes are multiplied as dense matrices
 DENSE = 24
 
-#: relative change of a sweep that is rounding where it does not fall any more
+#: relative change of an iteration that is rounding where it does not fall any more
 ROUNDING = 1e-13
 
 #: what the windows of a motion work in. Rows (nodes, W) of the moving bodies' numbers, W as of `rows`: x, y, u, g,
@@ -388,7 +388,7 @@ def add_rate_products(model, matrix, x, s, coupled, out):
 
 @kernel
 def solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, share, accuracy, work):
-    """Solve the linearised equations of a window for u at its nodes, by sweeps.
+    """Solve the linearised equations of a window for u at its nodes, by iterations.
 
     In:
       model: the compiled scene.
@@ -397,28 +397,28 @@ def solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, share
       history, o: the history of steps, and its stage of node 0: K, C and slopes of the loads.
       workspace: the workspace, for its switches.
       weight (W,): of `motion_weights`.
-      share: of the square of the correction to which sweeps go: what the linearisation is off by.
+      share: of the square of the correction to which iterations go: what the linearisation is off by.
       accuracy: relative change of the states at which to stop at the latest.
     In and out:
       nodes: with g, slopes, ref_x and ref_y; u is a first guess, then the solution, and x and y are those of it.
       work (WORK,): counts of work, added to.
 
-    Returns the relative correction of x against ref_x, or -1 where the sweeps do not contract.
+    Returns the relative correction of x against ref_x, or -1 where the iterations do not contract.
     """
     correction = 0.0
     last = np.inf
     growing = 0
     c = planes[0, 0]
     rates = has_rates(model, workspace)
-    for sweep in range(81):
+    for iteration in range(81):
         change = move_to_nodes(
             planes[2], s, h * h, nodes.none, nodes.ahead, c, nodes.u, weight, nodes.ref_x, nodes.x, nodes.dx
         )
         if rates:
             integrate_to_nodes(planes[1], s, s, h, nodes.start, nodes.none, c, nodes.u, nodes.y)
-        if sweep > 0:
-            work[SWEEPS] += 1
-            if sweep == 1:
+        if iteration > 0:
+            work[BODY_ITERATIONS] += 1
+            if iteration == 1:
                 correction = largest_difference(nodes.x, nodes.ref_x, weight, s)
             if not change <= 1e8:
                 return -1.0
@@ -427,7 +427,7 @@ def solve_nodes(model, planes, s, h, history, o, workspace, nodes, weight, share
             if change >= last and change < ROUNDING:
                 break
             growing = growing + 1 if change >= last else 0
-            if growing >= 3 or sweep == 80:
+            if growing >= 3 or iteration == 80:
                 return -1.0
             last = change
         if rates:

@@ -14,13 +14,13 @@ from mdstopo.general.integrators.generalized_alpha import TAG
 from mdstopo.general.steps.method_interface import implement
 from mdstopo.general.steps.step_history import FIRST, SEGMENT, copy_vector
 from mdstopo.general.steps.step_linear import (
-    find_sweep,
+    find_iteration,
+    iterate,
     keep_free,
     prepare_stage_back,
     prepare_stage_forward,
     stage_back,
     stage_forward,
-    sweep,
 )
 from mdstopo.integrators.springs_generalized_alpha import weights_of as alpha_weights
 from mdstopo.integrators.steps import REVERSE
@@ -220,7 +220,7 @@ def _stage_row_back(
 
 
 @kernel
-def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
+def step_forward(tag, model, tables, history, w, c, iterations, dq, dv, dx, force, changes, rows, workspace):
     """Push changes at the start of step w through its stages to its end; see `method_interface.step_forward`.
 
     dx (R, 2, n) belongs to the acceleration and the auxiliary one; tables (1,): the spectral radius.
@@ -232,7 +232,7 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
     weights = alpha_weights(tables[0])
     e1, _, _, beta, gamma, _ = weights
     shift = np.empty(n)
-    unknowns = n + rows.shape[2] if sweeps > 0 else 0
+    unknowns = n + rows.shape[2] if iterations > 0 else 0
     by_change = np.empty((unknowns, n))
     room = np.empty((2, unknowns))
     settled = True
@@ -242,10 +242,10 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
         if j == last:
             shift_tangents(model, history.q[w], history.stage_q[o + j], workspace.tangents[OF_STEP])
         segment = history.index[w, SEGMENT]
-        k, c_stage = prepare_stage_forward(model, history, segment, o + j, w_q, w_v, sweeps, workspace)
-        sweeping = sweeps > 0 and j == last
-        if sweeping:
-            find_sweep(model, history, o + j, k, c_stage, w_q, w_v, workspace, by_change)
+        k, c_stage = prepare_stage_forward(model, history, segment, o + j, w_q, w_v, iterations, workspace)
+        iterating = iterations > 0 and j == last
+        if iterating:
+            find_iteration(model, history, o + j, k, c_stage, w_q, w_v, workspace, by_change)
         for m in range(count):
             _reach_of_stage(
                 model, history, w, o, j, last, h, weights, dq[m], dv[m], dx[m], force[m, j], changes[m, j], shift
@@ -255,8 +255,8 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
             u = changes[m, j, 1]
             f = changes[m, j, 2]
             stage_forward(model, history, o + j, k, c_stage, workspace, x, u, f, rows[m, j])
-            if sweeping:
-                settled = sweep(by_change, sweeps, room, f, rows[m, j]) and settled
+            if iterating:
+                settled = iterate(by_change, iterations, room, f, rows[m, j]) and settled
             if j == last:
                 add_shift(model, workspace.tangents[OF_STEP], w_q, f, x)
                 for d in range(n):

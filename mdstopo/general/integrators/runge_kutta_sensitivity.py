@@ -60,11 +60,11 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
 
 
 @kernel
-def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
+def step_forward(tag, model, tables, history, w, c, iterations, dq, dv, dx, force, changes, rows, workspace):
     """Push changes at the start of a step through its stages to its end; see `method_interface.step_forward`.
     Returns True.
 
-    Not used: c, sweeps, dx: partial steps are steps of their own, no stage is implicit, nothing else is carried.
+    Not used: c, iterations, dx: partial steps are steps of their own, no stage is implicit, nothing else is carried.
     """
     changes_forward(tag, model, tables, history, w, dq, dv, force, changes, rows, workspace)
     return True

@@ -232,7 +232,7 @@ def begin(model, history, first, step, states, sets):
 
 @entry
 def push(
-    tag, ints, floats, tables, alpha, limits, count, which, rows, integral, sweeps, room, room_ints, member_state,
+    tag, ints, floats, tables, alpha, limits, count, which, rows, integral, iterations, room, room_ints, member_state,
     padded, out, first, work,
 ):  # fmt: skip
     """The derivatives of rows of `extremes`, or of one integral, by the design, carried forward with the motion.
@@ -246,7 +246,7 @@ def push(
       which (R, 2): each row's response, and 1 where the component across its vector is meant
         (`adjoint.row_cotangents`), else 0. rows (R, COLUMNS): the rows, the earliest first; of an integral not read.
       integral: 0: the rows are meant; 1: the integral of the one response; 2: that of its square.
-      sweeps: above 0, by the iterative method, with so many sweeps at most.
+      iterations: above 0, by the iterative method, with so many iterations at most.
       first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
     In and out:
       room, room_ints: the history of steps; a partial step may come behind the others.
@@ -255,7 +255,7 @@ def push(
       out (R, N + P): the derivatives by alpha, then by parameters. padded (R, M_padded + P): scratch.
       work (WORK,): counts of work, added to.
 
-    Returns the step in which the sweeps did not settle, or -1.
+    Returns the step in which the iterations did not settle, or -1.
     """
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
@@ -284,7 +284,7 @@ def push(
     else:
         while r < rows.shape[0] and _step_of(rows[r]) < 0:
             add_row(
-                tag, model, tables, member_state, history, count, which[r], rows[r], sweeps, found, workspace, step,
+                tag, model, tables, member_state, history, count, which[r], rows[r], iterations, found, workspace, step,
                 states, sets, padded[r], work,
             )  # fmt: skip
             r += 1
@@ -298,7 +298,7 @@ def push(
         found = False
         while integral == 0 and r < rows.shape[0] and _step_of(rows[r]) == k:
             settled, found = add_row(
-                tag, model, tables, member_state, history, count, which[r], rows[r], sweeps, found, workspace, step,
+                tag, model, tables, member_state, history, count, which[r], rows[r], iterations, found, workspace, step,
                 states, sets, padded[r], work,
             )  # fmt: skip
             if not settled:
@@ -307,7 +307,7 @@ def push(
         if integral == 0 and r == rows.shape[0]:
             break
         if not found and not find_step_map(
-            tag, model, tables, history, k, 1.0, sweeps, bars[o:end], rows_bar[o:end], workspace, step
+            tag, model, tables, history, k, 1.0, iterations, bars[o:end], rows_bar[o:end], workspace, step
         ):
             return k
         through_step(model, member_state, history, k, step, sets_bar[o:end], fresh, states, sets, work)
@@ -327,7 +327,22 @@ def _step_of(row):
 
 @kernel
 def add_row(
-    tag, model, tables, member_state, history, count, own, row, sweeps, found, workspace, step, states, sets, out, work
+    tag,
+    model,
+    tables,
+    member_state,
+    history,
+    count,
+    own,
+    row,
+    iterations,
+    found,
+    workspace,
+    step,
+    states,
+    sets,
+    out,
+    work,
 ):
     """Differentiate one row, with the derivatives of the state at the start of the step that it is read in.
 
@@ -336,7 +351,7 @@ def add_row(
       model: the compiled scene.
       count: how many steps there are.
       own (2,), row (COLUMNS,): as of `push`: which and rows of this one.
-      sweeps: as of `push`.
+      iterations: as of `push`.
       found: whether `step` is the map of the whole step.
       states (W + 1, M_padded + P), sets (slots, M_padded + P): as of `through_step`.
     In and out:
@@ -348,7 +363,7 @@ def add_row(
       workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
 
-    Returns whether all sweeps settled, and whether `step` is now the map of the whole step.
+    Returns whether all iterations settled, and whether `step` is now the map of the whole step.
     """
     n = model.mass.shape[0]
     bars = np.zeros((3, n))
@@ -363,7 +378,7 @@ def add_row(
     if not (whole and found):
         none = np.empty((0, 3, n))
         no_rows = np.empty((0, model.size[0]))
-        if not find_step_map(tag, model, tables, history, w, c, sweeps, none, no_rows, workspace, step):
+        if not find_step_map(tag, model, tables, history, w, c, iterations, none, no_rows, workspace, step):
             return False, False
     add_state(model, member_state, history, w, step, bars, bar_set, states, sets, out, work)
     return True, whole

@@ -102,7 +102,7 @@ def make_step_map(model, vectors, by_poses):
 
 
 @kernel
-def find_step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, workspace, step):
+def find_step_map(tag, model, tables, history, w, c, iterations, bars, rows_bar, workspace, step):
     """Find the map of step w.
 
     Constant:
@@ -110,14 +110,14 @@ def find_step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, wor
       model: the compiled scene.
       history, w: the history of steps, and the step.
       c: fraction of the step at which it is taken to end.
-      sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most (`iterative`).
+      iterations: above 0, implicit stages are solved by so many fixed-point iterations at most (`iterative`).
       bars (s, 3, n), rows_bar (s, n_row): cotangents of an integral by q, v, a and the multipliers of the stages; no
         rows where there is none.
     Out:
       step: the map (`StepMap`).
       workspace: workspace of a balance, overwritten.
 
-    Returns whether all sweeps settled.
+    Returns whether all iterations settled.
     """
     n = model.mass.shape[0]
     o = history.index[w, FIRST]
@@ -138,7 +138,7 @@ def find_step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, wor
             b += 1
         settled = (
             step_forward(
-                tag, model, tables, history, w, c, sweeps, step.dq[:count], step.dv[:count], step.dx[:count],
+                tag, model, tables, history, w, c, iterations, step.dq[:count], step.dv[:count], step.dx[:count],
                 step.force[:count], step.changes[:count], step.rows[:count], workspace,
             )
             and settled

@@ -86,14 +86,14 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
     raise NotImplementedError
 
 
-def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
+def step_forward(tag, model, tables, history, w, c, iterations, dq, dv, dx, force, changes, rows, workspace):
     """Push R changes through a step; what a stage needs is formed once for all R.
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
       history, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
-      sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most (`iterative`).
+      iterations: above 0, implicit stages are solved by so many fixed-point iterations at most (`iterative`).
       force (R, s or more, n): changes of the force at each stage.
     In and out:
       dq, dv (R, n): changes of coordinates and velocities, of the start and then of the end.
@@ -102,7 +102,7 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
       changes (R, s or more, 3, n), rows (R, s or more, n_row): changes of the stages' q, v, a and multipliers.
       workspace: workspace of a balance, overwritten.
 
-    Returns whether all sweeps settled.
+    Returns whether all iterations settled.
     """
     raise NotImplementedError
 

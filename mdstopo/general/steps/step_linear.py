@@ -38,7 +38,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 )
 from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 
-#: change of a sweep of the iterative method, relative, at which it has settled
+#: change of an iteration of the iterative method, relative, at which it has settled
 SETTLED = 1e-12
 
 
@@ -365,22 +365,22 @@ def free_places(model):
 
 
 @kernel
-def prepare_stage_forward(model, history, segment, o, w_q, w_v, sweeps, workspace):
+def prepare_stage_forward(model, history, segment, o, w_q, w_v, iterations, workspace):
     """Prepare a stage for `stage_forward`: once for any number of changes. Returns its K and C.
 
     model: the compiled scene.
     history: the history of steps (`StepHistory`).
     segment, o: the segment of `model.times` that the stage is in, and its number.
     w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
-    sweeps: above 0 where the sweeps of the iterative method account for that (`sweep`), 0 where the matrix W does.
+    iterations: above 0 where those of the iterative method account for that (`iterate`), 0 where the matrix W does.
     workspace: workspace of a balance, which takes what is prepared.
     """
     k, c = lay_out(model, history, segment, o, workspace)
     if not has_factors(history):
-        of_matrix = 0.0 if sweeps > 0 else 1.0  # sweeps account for the stage's own accelerations
+        of_matrix = 0.0 if iterations > 0 else 1.0  # iterations account for the stage's own accelerations
         factor_matrix(
             model, workspace, k, c, history.turn[o], mass_of(history, o), of_matrix * w_q, of_matrix * w_v,
-            workspace.tangents[OF_STEP if sweeps == 0 else NO_SHIFT], np.bool_(False),
+            workspace.tangents[OF_STEP if iterations == 0 else NO_SHIFT], np.bool_(False),
         )  # fmt: skip
     return k, c
 
@@ -396,7 +396,7 @@ def stage_forward(model, history, o, k, c, workspace, dq, dv, force, row):
       o: number of the stage, the one that was prepared last (`prepare_stage_forward`).
       k, c (n_pair, 2 D, 2 D): its K and C.
       dq, dv (n,): changes of coordinates and velocities, without those by the stage's own accelerations, for which the
-        matrix W accounts; where it was prepared for sweeps, these do (`sweep`).
+        matrix W accounts; where it was prepared for iterations, these do (`iterate`).
     In place:
       force (n,): changes of the forces, then of the accelerations.
       row (n_row,): changes of the right side of the rows, then of the multipliers.
@@ -412,14 +412,14 @@ def stage_forward(model, history, o, k, c, workspace, dq, dv, force, row):
 
 
 @kernel
-def find_sweep(model, history, o, k, c, w_q, w_v, workspace, by_change):
-    """Find what a sweep of the iterative method makes of changes of an implicit stage's accelerations.
+def find_iteration(model, history, o, k, c, w_q, w_v, workspace, by_change):
+    """Find what an iteration of the iterative method makes of changes of an implicit stage's accelerations.
 
     Constant:
       model: the compiled scene.
       history: the history of steps (`StepHistory`).
     In:
-      o: number of the stage, which is prepared for sweeps (`prepare_stage_forward`).
+      o: number of the stage, which is prepared for iterations (`prepare_stage_forward`).
       k, c (n_pair, 2 D, 2 D): its K and C.
       w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
     Out:
@@ -444,20 +444,20 @@ def find_sweep(model, history, o, k, c, w_q, w_v, workspace, by_change):
 
 
 @kernel
-def sweep(by_change, sweeps, room, force, row):
-    """Solve x = b + S x by fixed-point sweeps, which begin at zero; S is what a sweep makes of accelerations.
+def iterate(by_change, iterations, room, force, row):
+    """Solve x = b + S x by fixed-point iterations, which begin at zero; S is what an iteration makes of accelerations.
 
-    by_change (n + n_row, n): S (`find_sweep`). sweeps: how many at most. room (2, n + n_row): scratch.
+    by_change (n + n_row, n): S (`find_iteration`). iterations: how many at most. room (2, n + n_row): scratch.
     force (n,), row (n_row,): b, of accelerations and multipliers; then x. In place.
 
-    Returns whether the sweeps have settled.
+    Returns whether the iterations have settled.
     """
     n = force.shape[0]
     x = room[0]
     new = room[1]
     x[:] = 0.0
     last = np.inf
-    for _ in range(sweeps):
+    for _ in range(iterations):
         change = 0.0
         size = 0.0
         for i in range(new.shape[0]):
