@@ -4,6 +4,7 @@ A named tuple of thirty arrays is two hundred arguments to the compiler, at ever
 one. Inside kernels a structure is made and read like a named tuple; Python never sees one.
 """
 
+from importlib import import_module
 from typing import Any
 
 from mdstopo.compiler.kernel import when_compiling
@@ -22,6 +23,8 @@ def bundle(maker: type, fields: tuple[str, ...]) -> None:
     def register() -> None:
         from numba import types
         from numba.experimental import structref
+
+        import_module(PLACE)  # a type is kept by its name only where the module that has it is loaded, else it is copied
 
         def preprocess_fields(self: Any, given: Any) -> Any:
             """Literal types would make every literal another structure."""
