@@ -317,6 +317,26 @@ def test_types_of_general_scenes_are_found_by_processes_that_have_springs_only()
     assert done.stdout.split() == ["PlanarViewStructure", "WorkspaceStructure"]
 
 
+def test_a_type_of_a_structure_is_found_by_the_process_that_reads_it():
+    """A copy in the cache would be another type there, without attributes."""
+    kept = (
+        "from mdstopo.compiler.kernel import numba\n"
+        "from mdstopo.general.model import bundles, general_model\n"
+        "numba()\n"
+        "from numba.core.serialize import dumps\n"
+        "print(dumps(bundles.KINDS['PlanarViewStructure']).hex())\n"
+    )
+    read = (
+        "import pickle, sys; from mdstopo.general import structures\n"
+        "print(pickle.loads(bytes.fromhex(sys.stdin.read())) is structures.PlanarViewStructure)\n"
+    )
+    text = ""
+    for script in (kept, read):
+        command = [sys.executable, "-c", script]
+        text = subprocess.run(command, input=text, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert text.split() == ["True"]
+
+
 INSIDE = """
 import sys
 import numpy as np
