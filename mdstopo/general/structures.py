@@ -6,7 +6,7 @@ one. Inside kernels a structure is made and read like a named tuple; Python neve
 
 from typing import Any
 
-from mdstopo.compiler.kernel import numba, when_compiling
+from mdstopo.compiler.kernel import numba, way, when_compiling
 
 _KINDS: dict[str, type] = {}
 _ENDING = "Structure"
@@ -58,4 +58,4 @@ def bundle(maker: type, fields: tuple[str, ...]) -> None:
         kind = type(f"{maker.__name__}{_ENDING}", (types.StructRef,), members)
         _KINDS[kind.__name__] = kind
         structref.register(kind)
-        structref.define_constructor(maker, kind, list(fields))
+        way().enter_structure(maker, kind, fields)
