@@ -297,8 +297,8 @@ class Lower(NumbaLower):
 
     def _slices(self, name: str, array: Any, wanted: Any, made: Any) -> tuple[Any, ...]:
         """The types of numbers and a slice behind them, without a step, that cut an array out of one in C order."""
-        kinds = _kinds(wanted)
-        if kinds[-1] != types.slice2_type or not isinstance(made, types.Array) or made.layout != "C":
+        kinds = _kinds(wanted)  # none: an array without dimensions
+        if kinds[-1:] != (types.slice2_type,) or not isinstance(made, types.Array) or made.layout != "C":
             return ()
         return kinds if self._numbers(name, array, types.UniTuple(types.intp, len(kinds))) else ()
 
