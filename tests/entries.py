@@ -1,12 +1,17 @@
-"""Tests call entries with such types of arguments alone as a wheel has machine code for (packaging/entries.txt)."""
+"""Tests call entries with such types of arguments alone as a wheel has machine code for (packaging/entries.txt).
+
+What cannot be compiled by `numba_private` fails there and then. Outside of tests a process goes on in Numba's own way,
+with a notice; of a test that passes nobody reads it, and those behind it would compile for minutes.
+"""
 
 import gc
 import runpy
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
+from mdstopo.compiler import tried
 from mdstopo.compiler.entry import Entry
 
 SHIP = Path(__file__).resolve().parents[1] / "packaging" / "ship_kernels.py"
@@ -43,5 +48,9 @@ def hold_calls() -> None:
         finally:
             gc.freeze()
 
+    def fail(error: Exception, _: str) -> NoReturn:
+        raise error
+
+    tried.without_private = fail  # type: ignore[assignment]
     Entry._ready = checked  # type: ignore[method-assign,assignment]
     Entry._built = frozen  # type: ignore[method-assign]

@@ -20,7 +20,7 @@ from mdstopo.compiler.store import Code, alone, cache_folder, read, read_checked
 SPLIT = "mdstopo.general."
 #: instructions, as written for LLVM, from which on a function is long. LLVM inlines functions of some fifty, when what
 #: can be done away with is gone; so what is called by its symbol instead loses nothing
-LONG = 400
+LONG = 160
 #: modules of deep calls, whose long functions would else be optimised once more with everyone that calls them
 STAYING = ("mdstopo.optimizer.conic_kernels", "mdstopo.optimizer.reduced", "mdstopo.optimizer.cones")
 #: what a symbol of our own kernels begins with; symbols of functions that Numba makes differ between processes

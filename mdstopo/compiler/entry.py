@@ -160,7 +160,8 @@ class Entry(Kernel):
 
         if not _may_compile.get():
             raise NotCompiledError
-        told.compiling(f"{self.py_func.__module__.removeprefix('mdstopo.')}.{self.py_func.__name__}")
+        name = f"{self.py_func.__module__.removeprefix('mdstopo.')}.{self.py_func.__name__}"
+        told.compiling(name)
         way()
         found = tried.private()
         if found is None:
@@ -168,7 +169,7 @@ class Entry(Kernel):
         try:
             code: Code | None = found.build(self.dispatcher, types)
         except Exception as error:
-            with tried.without_private(error):
+            with tried.without_private(error, name):
                 self._callable = self._wrapped()
                 way().compile_for(self._callable, types)
             return None

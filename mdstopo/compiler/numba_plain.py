@@ -9,6 +9,7 @@ from typing import Any
 
 import numba
 from numba import types
+from numba.experimental import structref
 from numba.extending import overload
 
 from mdstopo.compiler import threads
@@ -88,3 +89,8 @@ def enter_threads() -> None:
             return counter[0] - 1
 
         return first
+
+
+def enter_structure(maker: type, kind: type, fields: tuple[str, ...]) -> None:
+    """Have `maker(...)` make a structure of a kind."""
+    structref.define_constructor(maker, kind, list(fields))

@@ -29,11 +29,11 @@ import numba.np.arrayobj
 import numpy as np
 from llvmlite import binding as llvm
 from llvmlite import ir as llvm_ir
-from llvmlite.ir.instructions import InsertValue
 from numba import types
 from numba.core import (
     analysis,
     base,
+    callconv,
     cgutils,
     consts,
     cpu_options,
@@ -62,14 +62,17 @@ from numba.core.target_extension import CPU, dispatcher_registry, jit_registry, 
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import AnnotateTypes, BaseNativeLowering, NativeLowering, NopythonRewrites
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.unsafe import eh
 from numba.core.untyped_passes import InlineClosureLikes
-from numba.experimental.structref import _Utils as _Structure
-from numba.extending import lower_builtin, overload
+from numba.experimental import structref
+from numba.experimental.jitclass.base import imp_dtor
+from numba.extending import lower_builtin, overload, type_callable
 from numba.np.arrayobj import fix_integer_index, load_item, store_item
 
 from mdstopo.compiler import compiled_units as units
 from mdstopo.compiler import threads
 from mdstopo.compiler.entry import EXCUSE, LENGTHS, NUMBERS
+from mdstopo.compiler.instructions import Builder, prune
 from mdstopo.compiler.numba_plain import numba_type
 from mdstopo.compiler.store import CALL, PREPARED, Code, cache_folder, read_checked, write_checked
 from mdstopo.compiler.tried import UnexpectedError, has_own_passes
@@ -96,6 +99,9 @@ _ERRORS: Any = errors
 # Numbers that index an array in C order become an address from the array's fields, not from a copy of them in memory.
 # So does another shape of one that a function got. A computed place does not count from the end.
 
+#: what a step of a loop over `range` gives: a number, and whether there is one
+_COUNTED = types.Pair(types.int64, types.boolean)
+
 #: places of an array's fields in Numba's structure of it
 _HOLDER, _PARENT, _COUNT, _SIZE, _DATA, _SHAPE, _STRIDES = range(7)
 
@@ -114,8 +120,19 @@ class Lower(NumbaLower):
 
     def setup_function(self, fndesc: Any) -> None:
         super().setup_function(fndesc)
-        self.builder = _Builder(self.entry_block)
+        self.builder = Builder(self.entry_block)
+        self.builder.catches = any(
+            isinstance(inst.value, ir.Global) and inst.value.value is eh.mark_try_block
+            for block in self.blocks.values()
+            for inst in block.find_insts(ir.Assign)
+        )
+        self._data: dict[int, Any] = {}
         self.call_helper = self.call_conv.init_call_helper(self.builder)
+
+    def lower_normal_function(self, fndesc: Any) -> None:
+        """Write the function, without what nobody uses."""
+        super().lower_normal_function(fndesc)
+        prune(self.function)
 
     def _find_singly_assigned_variable(self) -> None:
         """Those that need no place in memory; ones that are counted keep it, because they may be let go of twice."""
@@ -126,7 +143,7 @@ class Lower(NumbaLower):
         self._values: dict[str, Any] = {}
 
     def _is_counted(self, name: str) -> bool:
-        return name not in self._borrowed and self.context.data_model_manager[self.typeof(name)].contains_nrt_meminfo()
+        return name not in self._borrowed and _counts(self.context, self.typeof(name))
 
     def loadvar(self, name: str) -> Any:
         held = self._values.get(name)
@@ -134,7 +151,11 @@ class Lower(NumbaLower):
 
     def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
         self._values.pop(name, None)  # what it held before, which is let go of, is read from memory
-        super().storevar(value, name, argidx)
+        if argidx is None and name not in self._singly_assigned_vars and not self._is_counted(name):
+            self._alloca_var(name, self.typeof(name))
+            self.builder.store(value, self.getvar(name))  # nothing is let go of
+        else:
+            super().storevar(value, name, argidx)
         if name in self._held:
             self._values[name] = value
 
@@ -153,6 +174,10 @@ class Lower(NumbaLower):
             self.context = self._counting
 
     def lower_expr(self, resty: Any, expr: Any) -> Any:
+        if expr.op in ("getiter", "iternext", "pair_first", "pair_second"):
+            found = self._counted_off(expr)
+            if found is not None:
+                return found
         if self.context is self._plain and expr.op == "getattr":
             kind = self.typeof(expr.value.name)
             if isinstance(kind, types.StructRef):
@@ -161,10 +186,49 @@ class Lower(NumbaLower):
             return self._reshaped(resty, expr)
         return super().lower_expr(resty, expr)
 
+    def _counted_off(self, expr: Any) -> Any:
+        """A step of a loop over `range` by a number that is written; nothing where it is something else.
+
+        Numba's way, but without choosing what is known beforehand, and with values in place of structures in memory.
+        """
+        build, kind = self.builder, self.typeof(expr.value.name)
+        if self._lasting or kind not in (_COUNTED, types.range_iter64_type, types.range_state64_type):
+            return None
+        given = self.loadvar(expr.value.name)
+        if expr.op.startswith("pair"):
+            return build.extract_value(given, int(expr.op == "pair_second"))
+        if expr.op == "iternext":
+            place, left = (build.extract_value(given, k) for k in (0, 3))
+            count, value = build.load(left), build.load(place)
+            build.store(build.sub(count, count.type(1), flags=["nsw"]), left)
+            build.store(build.add(value, build.extract_value(given, 2)), place)
+            goes_on = build.icmp_signed(">", count, count.type(0))
+            return cgutils.pack_struct(build, (value, goes_on))
+        start, stop, step = (build.extract_value(given, k) for k in range(3))
+        if not isinstance(step, llvm_ir.Constant) or step.constant not in (1, -1):
+            return None
+        distance = build.sub(stop, start) if step.constant == 1 else build.sub(start, stop)
+        zero = start.type(0)
+        count = build.select(build.icmp_signed(">", distance, zero), distance, zero)
+        place, left = (cgutils.alloca_once_value(build, value) for value in (start, count))
+        return cgutils.pack_struct(build, (place, stop, step, left))
+
     def _field(self, kind: Any, given: Any, name: str, wanted: Any) -> Any:
         """A field of a structure that lives as long as the call, not counted."""
-        fields = _Structure(self._counting, self.builder, kind).get_data_struct(given)
-        return self.context.cast(self.builder, getattr(fields, name), kind.field_dict[name], wanted)
+        k = self.context.data_model_manager[kind.get_data_type()].get_field_position(name)
+        value = self.builder.load(_field_of(self.context, self.builder, kind, self._data_of(given), k))
+        return self.context.cast(self.builder, value, kind.field_dict[name], wanted)
+
+    def _data_of(self, given: Any) -> Any:
+        """Where the fields of a structure are; of one that the function was given it is found out once."""
+        held = self.builder.extract_value(given, 0)
+        if id(held) in self._data:
+            return self._data[id(held)]
+        if not isinstance(held, llvm_ir.Argument):
+            return self._counting.nrt.meminfo_data(self.builder, held)
+        with self.builder.goto_entry_block():
+            self._data[id(held)] = self._counting.nrt.meminfo_data(self.builder, held)
+        return self._data[id(held)]
 
     def _reshaped(self, kind: Any, call: Any) -> Any:
         """An array in C order, in another shape, of which no length is -1; the numbers must be as many."""
@@ -189,17 +253,22 @@ class Lower(NumbaLower):
 
     def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
         array, wanted = signature.args
-        kinds = self._numbers(value.name, array, wanted)
+        made = signature.return_type
+        kinds = self._numbers(value.name, array, wanted) or self._slices(value.name, array, wanted, made)
         if not kinds:
             return super().lower_getitem(resty, expr, value, index, signature)
-        given = self.loadvar(value.name)
-        address = self._address(array, given, kinds, self._index(index.name, wanted))
-        if len(kinds) == array.ndim:
+        given, places = self.loadvar(value.name), self._index(index.name, wanted)
+        count = None
+        if kinds[-1] == types.slice2_type:
+            start, count = self._span(places[-1], self.builder.extract_value(given, [_SHAPE, len(kinds) - 1]))
+            kinds, places = (*kinds[:-1], types.intp), [*places[:-1], start]
+        address = self._address(array, given, kinds, places, checked=len(places) - (count is not None))
+        if len(kinds) == array.ndim and count is None:
             found = load_item(self.context, self.builder, array, address)
         else:
-            found = self._view(signature.return_type, given, address)
-            found = impl_ret_borrowed(self.context, self.builder, signature.return_type, found)
-        return self.context.cast(self.builder, found, signature.return_type, resty)
+            found = self._view(made, given, address, count)
+            found = impl_ret_borrowed(self.context, self.builder, made, found)
+        return self.context.cast(self.builder, found, made, resty)
 
     def lower_setitem(self, target_var: Any, index_var: Any, value_var: Any, signature: Any) -> Any:
         array, wanted, kind = signature.args
@@ -226,6 +295,28 @@ class Lower(NumbaLower):
         fits = len(kinds) <= array.ndim and all(isinstance(kind, types.Integer) for kind in kinds)
         return kinds if fits else ()
 
+    def _slices(self, name: str, array: Any, wanted: Any, made: Any) -> tuple[Any, ...]:
+        """The types of numbers and a slice behind them, without a step, that cut an array out of one in C order."""
+        kinds = _kinds(wanted)  # none: an array without dimensions
+        if kinds[-1:] != (types.slice2_type,) or not isinstance(made, types.Array) or made.layout != "C":
+            return ()
+        return kinds if self._numbers(name, array, types.UniTuple(types.intp, len(kinds))) else ()
+
+    def _span(self, given: Any, length: Any) -> tuple[Any, Any]:
+        """Where a slice begins along a dimension, and how many it has; as in Python it may count from the end."""
+        build = self.builder
+        zero = length.type(0)
+        ends = []
+        for end in (build.extract_value(given, k) for k in (0, 1)):
+            if isinstance(end, llvm_ir.Constant) and end.constant == types.intp.maxval:
+                ends.append(length)
+                continue
+            for other in (build.add(end, length), zero):
+                end = build.select(build.icmp_signed("<", end, zero), other, end)
+            ends.append(build.select(build.icmp_signed("<", end, length), end, length))
+        count = build.sub(ends[1], ends[0])
+        return ends[0], build.select(build.icmp_signed(">", count, zero), count, zero)
+
     def _index(self, name: str, wanted: Any) -> list[Any]:
         """The numbers of an index."""
         value = self.context.cast(self.builder, self.loadvar(name), self.typeof(name), wanted)
@@ -233,11 +324,17 @@ class Lower(NumbaLower):
             return [value]
         return [self.builder.extract_value(value, k) for k in range(len(wanted))]
 
-    def _address(self, array: Any, given: Any, kinds: Any, index: Any) -> Any:
-        """Where the item is, or the first one of the view; the arithmetic is Numba's own."""
+    def _address(self, array: Any, given: Any, kinds: Any, index: Any, checked: int | None = None) -> Any:
+        """Where the item is, or the first one of the view; the arithmetic is Numba's own.
+
+        checked: of how many of the places NUMBA_BOUNDSCHECK asks; None: of all. The start of a slice may be its end.
+        """
         build = self.builder
         shape = [build.extract_value(given, [_SHAPE, k]) for k in range(array.ndim)]
         places = [self._place(*each) for each in zip(kinds, index, shape, strict=False)]
+        if self.context.enable_boundscheck:
+            for place, length in list(zip(places, shape, strict=False))[:checked]:
+                cgutils.do_boundscheck(self.context, build, place, length)
         data = build.extract_value(given, _DATA)
         return cgutils.get_item_pointer2(self.context, build, data, shape, (), "C", places)
 
@@ -245,32 +342,37 @@ class Lower(NumbaLower):
         """A place along one dimension. One that is written as a number may count from the end, a computed one may not.
 
         Code that asks of every place whether it counts from the end keeps loops from reading and writing vectors.
-        With NUMBA_BOUNDSCHECK=1 a place outside of the array raises IndexError.
         """
         if isinstance(index, llvm_ir.Constant):
             place = fix_integer_index(self.context, self.builder, kind, index, length)
         else:
             place = self.context.cast(self.builder, index, kind, types.intp)
-        if self.context.enable_boundscheck:
-            cgutils.do_boundscheck(self.context, self.builder, place, length)
         return place
 
-    def _view(self, kind: Any, given: Any, address: Any) -> Any:
-        """The array of the last dimensions of another."""
+    def _view(self, kind: Any, given: Any, address: Any, count: Any = None) -> Any:
+        """The array of the last dimensions of another, or of so many along the first of these."""
         build = self.builder
         first = len(given.type.elements[_SHAPE]) - kind.ndim
         shape = [build.extract_value(given, [_SHAPE, first + k]) for k in range(kind.ndim)]
-        count = llvm_ir.Constant(cgutils.intp_t, 1)
+        if count is not None:
+            shape[0] = count
+        size = llvm_ir.Constant(cgutils.intp_t, 1)
         for length in shape:
-            count = build.mul(count, length, flags=["nsw"])
+            size = build.mul(size, length, flags=["nsw"])
         made = build.insert_value(self.context.get_constant_undef(kind), address, _DATA)
-        made = build.insert_value(made, count, _COUNT)
+        made = build.insert_value(made, size, _COUNT)
         for k in (_HOLDER, _PARENT, _SIZE):
             made = build.insert_value(made, build.extract_value(given, k), k)
         for k, length in enumerate(shape):
             made = build.insert_value(made, length, [_SHAPE, k])
             made = build.insert_value(made, build.extract_value(given, [_STRIDES, first + k]), [_STRIDES, k])
         return made
+
+
+@functools.cache
+def _counts(context: Any, kind: Any) -> bool:
+    """Whether something of a type is, or holds, memory that counts who holds it."""
+    return bool(context.data_model_manager[kind].contains_nrt_meminfo())
 
 
 def _lengths(given: Any) -> Any:
@@ -281,40 +383,6 @@ def _lengths(given: Any) -> Any:
 def _kinds(index: Any) -> tuple[Any, ...]:
     """The types of the parts of an index."""
     return tuple(index.types) if isinstance(index, types.BaseTuple) else (index,)  # type: ignore[attr-defined]
-
-
-class _Builder(llvm_ir.IRBuilder):  # type: ignore[misc]  # llvmlite is not typed
-    """A writer of instructions that takes a part of a value from where it was put in, or was last taken."""
-
-    def __init__(self, block: Any) -> None:
-        super().__init__(block)
-        self._taken: dict[Any, Any] = {}
-
-    def extract_value(self, agg: Any, idx: Any, name: str = "") -> Any:
-        places = list(idx) if isinstance(idx, (tuple, list)) else [idx]
-        while places:
-            put = _put_in(agg, places)
-            if put is None:
-                break
-            agg, places = put.operands[1], places[len(put.indices) :]
-        if not places:
-            return agg
-        key = id(self.block), id(agg), tuple(places)  # the instruction below keeps both alive
-        if key not in self._taken:
-            self._taken[key] = super().extract_value(agg, places, name)
-        return self._taken[key]
-
-
-def _put_in(value: Any, places: list[int]) -> Any:
-    """The instruction that put in the part of a value at these places, whole or as part of more; else nothing."""
-    while isinstance(value, InsertValue):
-        at = list(value.indices)
-        if at == places[: len(at)]:
-            return value
-        if at[: len(places)] == places:
-            return None  # it is put together from parts
-        value = value.operands[0]
-    return None
 
 
 def assigned_once(blocks: Any) -> set[str]:
@@ -835,6 +903,55 @@ def offer(stub: Callable[..., Any], choose: Callable[..., Any]) -> None:
     infer_global(stub)(Chosen)
 
 
+# Structures
+
+
+def enter_structure(maker: type, kind: type, fields: tuple[str, ...]) -> None:
+    """Have `maker(...)` make a structure of a kind where it is called. Numba's own way is a function for each, which is
+    given the fields in hundreds of arguments."""
+    named = inspect.Signature([inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in fields])
+
+    @type_callable(maker)
+    def typed(_context: Any) -> Any:
+        def typer(*given: Any) -> Any:
+            return kind(list(zip(fields, given, strict=True)))
+
+        typer.pysig = named  # type: ignore[attr-defined]
+        return typer
+
+    @lower_builtin(maker, types.VarArg(types.Any))
+    def made(context: Any, build: Any, sig: Any, given: Any) -> Any:
+        whole = sig.return_type
+        form = context.data_model_manager[whole.get_data_type()].get_value_type()
+        size = context.get_constant(types.uintp, context.get_abi_sizeof(form))
+        held = context.nrt.meminfo_alloc_dtor(build, size, imp_dtor(context, build.module, whole))
+        data = context.nrt.meminfo_data(build, held)
+        for k, (value, asked, has) in enumerate(zip(given, sig.args, whole.field_dict.values(), strict=True)):
+            field = context.cast(build, value, asked, has)
+            context.nrt.incref(build, has, field)
+            build.store(field, _field_of(context, build, whole, data, k))
+        return cgutils.pack_struct(build, [held])
+
+
+def _field_of(context: Any, build: Any, kind: Any, data: Any, k: int) -> Any:
+    """Where a field of a structure is: an address that names the whole structure's type would be long to write and to
+    read."""
+    whole, offset = _offset(context, kind, k)
+    address = build.gep(data, [llvm_ir.Constant(_WORD, offset)], inbounds=True)
+    return build.bitcast(address, whole.elements[k].as_pointer())
+
+
+@functools.cache
+def _offset(context: Any, kind: Any, k: int) -> tuple[Any, int]:
+    """LLVM's type of a structure, and how far into it a field is."""
+    whole = context.data_model_manager[kind.get_data_type()].get_value_type()
+    target = context.target_data
+    if hasattr(whole, "get_element_offset"):
+        return whole, whole.get_element_offset(target, k)
+    pointer = whole._get_ll_pointer_type(target)  # llvmlite 0.43
+    return whole, target.get_element_offset(pointer.element_type, k)
+
+
 # Threads
 
 _WORD, _SMALL, _MEMORY = llvm_ir.IntType(64), llvm_ir.IntType(32), llvm_ir.IntType(8).as_pointer()
@@ -955,8 +1072,44 @@ class _Target(CPU):
 _TARGET = "mdstopo"
 
 
+class _Calls(callconv.CPUCallConv):
+    """Numba's convention of calls, in fewer instructions."""
+
+    def call_function(
+        self, builder: Any, callee: Any, resty: Any, argtys: Any, args: Any, attrs: Any = None
+    ) -> tuple[Any, Any]:
+        """Call a function of ours: where it puts what it raises is where its caller puts it.
+
+        builder: of the caller. callee, resty, argtys: the function, its result's type and its arguments' types. args:
+        the values. attrs: of the call, for LLVM.
+        """
+        if not isinstance(builder, Builder):
+            return super().call_function(builder, callee, resty, argtys, args, attrs)  # type: ignore[no-any-return]
+        result = cgutils.alloca_once(builder, self.get_return_type(resty).pointee)
+        given = self._get_arg_packer(argtys).as_arguments(builder, args)
+        raised = self._get_excinfo_argument(builder.function)
+        code = builder.call(callee, [result, raised, *given], attrs=tuple(attrs or ()))
+        status: Any = self._get_return_status(builder, code, builder.load(raised))
+        if not isinstance(resty, types.Optional):
+            failed = builder.icmp_signed("!=", code, code.type(0))
+            status = status._replace(is_ok=builder.not_(failed), is_error=failed)
+        return status, self.context.get_returned_value(builder, resty, builder.load(result))
+
+    def return_status_propagate(self, builder: Any, status: Any) -> None:
+        """End with what a function that was called has raised."""
+        if isinstance(builder, Builder) and not builder.catches:
+            self._return_errcode_raw(builder, status.code)
+        else:
+            super().return_status_propagate(builder, status)
+
+
 class _Context(CPUContext):
     """What is compiled for our target; functions of Numba's own inside ours as `_jit_without_code` has them."""
+
+    @functools.cached_property
+    def call_conv(self) -> _Calls:
+        """How functions are called."""
+        return _Calls(self)
 
     def insert_const_bytes(self, mod: Any, bytes: bytes, name: str | None = None) -> Any:
         """A constant, named by what is in it: Numba's name has Python's hash of it, which differs by process."""
@@ -1080,21 +1233,43 @@ def _name_flags_in_order() -> None:
     options.encode = lambda self: str(sorted(self.flags))
 
 
+def _shorten_symbols() -> None:
+    """A structure is in the symbols of all functions that are given one: by a hash of its name, which has the types of
+    all its fields."""
+    structure: Any = types.StructRef
+    structure.mangling_args = property(
+        lambda self: (f"{type(self).__name__}_{hashlib.sha256(self.name.encode()).hexdigest()[:16]}", ())
+    )
+
+
 def _spare_flags() -> None:
-    """Flags of functions are compared at every call, option by option. Those that were set are compared first, which
-    nearly always is enough; defaults are filled in only where these differ."""
+    """Flags of functions are looked up and compared at every call, option by option. Of those that were set only the
+    ones count that differ from the defaults."""
     config: Any = targetconfig.TargetConfig
 
+    @functools.cache
+    def defaults(kind: Any) -> dict[str, Any]:
+        return {key: option.default for key, option in kind.options.items()}
+
     def values(self: Any) -> dict[str, Any]:
-        stated = self._values
-        return {key: stated.get(key, option.default) for key, option in self.options.items()}
+        return {**defaults(self.__class__), **self._values}
+
+    def changed(self: Any) -> dict[str, Any]:
+        usual = defaults(self.__class__)
+        return {key: value for key, value in self._values.items() if value != usual[key]}
 
     def is_equal(self: Any, other: Any) -> Any:
         if not isinstance(other, config):
             return NotImplemented
-        return (type(self) is type(other) and self._values == other._values) or self.values() == other.values()
+        if type(self) is not type(other):
+            return self.values() == other.values()
+        return self._values == other._values or changed(self) == changed(other)
 
-    config.values, config.__eq__ = values, is_equal
+    @functools.cache
+    def hash_of(kind: Any) -> int:
+        return hash(tuple(kind.options))
+
+    config.values, config.__eq__, config.__hash__ = values, is_equal, lambda self: hash_of(self.__class__)
 
 
 def _spare_variables() -> None:
@@ -1205,6 +1380,18 @@ def _spare_contexts() -> None:
         module.new_error_context = Context
 
 
+def _spare_ranges() -> None:
+    """Lengths are said to be positive where they are read from memory; ours may come from elsewhere."""
+    arrays: Any = numba.np.arrayobj
+    say = arrays.set_range_metadata
+
+    def said(build: Any, value: Any, *bounds: Any) -> None:
+        if isinstance(value, llvm_ir.LoadInstr):
+            say(build, value, *bounds)
+
+    arrays.set_range_metadata = said
+
+
 def _spare_places() -> None:
     """Whether a function takes `loc` is seen in its code; what is made of others is asked as before."""
     implementations: Any = base
@@ -1295,6 +1482,7 @@ _enter_target()
 _name_flags_in_order()
 if _LEAN:
     _enter_sizes()
+    _shorten_symbols()
     _spare_registries()
     _remember_signatures()
     _spare_flags()
@@ -1305,6 +1493,7 @@ if _LEAN:
     _spare_classes()
     _spare_contexts()
     _spare_places()
+    _spare_ranges()
     _spare_rounds()
     names: Any = itanium_mangler
     names._escape_string = functools.lru_cache(1 << 16)(names._escape_string)
@@ -1742,6 +1931,19 @@ def _probe_chosen(x: Any, k: int) -> Any:
     raise NotImplementedError
 
 
+class _ProbePair:
+    """What makes the structure of the probe."""
+
+    row: Any
+    table: Any
+
+    def __init__(self, *_fields: Any) -> None: ...
+
+
+class _ProbeStructure(types.StructRef):
+    """Its type."""
+
+
 class _Chosen:
     """What `offer` takes for a kernel."""
 
@@ -1755,6 +1957,8 @@ def _probe() -> Any:
     shared_pass = _made(_probe_pass, _OPTIMISED, frozenset({"nsz"}), False)
     offer(_probe_chosen, lambda _x, _k: chosen)
     enter_threads(_probe_shared, _probe_taken)
+    structref.register(_ProbeStructure)
+    enter_structure(_ProbePair, _ProbeStructure, ("row", "table"))
 
     def probe(tag, x, table, yes, counter, done, how):  # type: ignore[no-untyped-def]
         """What is compiled and then called to see whether machine code does what is written.
@@ -1767,14 +1971,15 @@ def _probe() -> Any:
         done (9,): what they write.
         how: 1 raises ValueError.
         """
-        row = _probe_chosen(x, 2)
+        pair = _ProbePair(_probe_chosen(x, 2), table)
+        row = pair.row
         if how == 1:
             raise ValueError("asked for")
         _probe_shared(shared_pass, 2, (counter, done))
         listed = [x[1:].copy()]
         for _ in range(tag[1]):
             listed.append(row.copy())  # noqa: PERF401  (one after another, so that it grows)
-        table.reshape(table.size)[1] = listed[-1].sum()
+        pair.table.reshape(table.size)[1] = listed[-1].sum()
         return table[0, -1], len(listed) + done.sum(), yes and row[0] < 1.0
 
     return outer(probe, frozenset())

@@ -11,6 +11,7 @@ import contextlib
 import importlib
 import os
 import sys
+import traceback
 from collections.abc import Iterator
 from types import ModuleType
 from typing import ClassVar
@@ -101,20 +102,23 @@ def _decide() -> None:
         _Way.known, _Way.module = True, found
 
 
-def give_up(error: Exception) -> None:
-    """Compile in Numba's own way from now on, and say so once. Raises the error where an interrupt has led to it."""
+def give_up(error: Exception, compiled: str = "") -> None:
+    """Compile in Numba's own way from now on, and say so once. Raises the error where an interrupt has led to it.
+
+    compiled: the name of the function that could not be compiled; empty where it is not about one.
+    """
     _raise_if_interrupted(error)
     _Way.known, _Way.module = True, None
     if not os.environ.get(_TOLD):
         os.environ[_TOLD] = "given"
-        print(notice(error), file=sys.stderr, flush=True)
+        print(notice(error, compiled), file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
-def without_private(error: Exception) -> Iterator[None]:
+def without_private(error: Exception, compiled: str) -> Iterator[None]:
     """Try in Numba's own way what has raised an error in ours; where that goes well, `give_up`.
 
-    Raises the error where that goes wrong as well: then what is compiled is wrong, or what it is called with.
+    compiled: the name of the function that could not be compiled. Raises the error where that goes wrong as well: then what is compiled is wrong, or what it is called with.
     """
     _raise_if_interrupted(error)
     found = _Way.module
@@ -126,7 +130,7 @@ def without_private(error: Exception) -> Iterator[None]:
         _Way.module = found
         found.check()
         raise error from None
-    give_up(error)
+    give_up(error, compiled)
 
 
 @contextlib.contextmanager
@@ -161,10 +165,16 @@ def _is_interrupt(error: BaseException) -> bool:
     return False
 
 
-def notice(error: Exception) -> str:
-    """Which versions these are, why Numba compiles in its own way, and what is slower for it."""
+def notice(error: Exception, compiled: str = "") -> str:
+    """Which versions these are, why Numba compiles in its own way, and what is slower for it.
+
+    compiled: the name of the function that could not be compiled.
+    """
     reason = str(error) if isinstance(error, UnexpectedError) else f"{type(error).__name__}: {error}"
     reason = " ".join(reason.split())[:300]
+    if compiled:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        reason += f"; in {place.name}, line {place.lineno} of {os.path.basename(place.filename)}, for {compiled}"
     tried = ", ".join(f"{numba} with {llvmlite}" for numba, llvmlite in sorted(TRIED))
     return (
         f"Numba {version_of('numba')} with llvmlite {version_of('llvmlite')} compiles in its own way ({reason}): the "

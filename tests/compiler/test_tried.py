@@ -119,6 +119,12 @@ def test_anything_unexpected_leads_to_numba_s_own_way_with_one_notice(broken: st
     assert again == printed
 
 
+def test_the_notice_names_what_could_not_be_compiled_and_where_that_went_wrong(tmp_path: Path) -> None:
+    _, complained = run(tmp_path, BROKEN["a compilation that goes wrong later"])
+    assert "(AttributeError: gone; in stumbles, line" in complained
+    assert "of kernels.py, for __main__.whole)" in complained
+
+
 def test_versions_that_were_tried_are_used_without_a_notice(tmp_path: Path) -> None:
     assert tried.versions() in tried.TRIED
     assert run(tmp_path, "") == ([f"{RIGHT} True", "refused"], "")

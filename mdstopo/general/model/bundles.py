@@ -7,7 +7,7 @@ one. Inside kernels a structure is made and read like a named tuple; Python neve
 from importlib import import_module
 from typing import Any
 
-from mdstopo.compiler.kernel import when_compiling
+from mdstopo.compiler.kernel import way, when_compiling
 
 #: the module that types of structures are said to be in, and what their names end with
 PLACE, ENDING = "mdstopo.general.structures", "Structure"
@@ -34,4 +34,4 @@ def bundle(maker: type, fields: tuple[str, ...]) -> None:
         kind = type(f"{maker.__name__}{ENDING}", (types.StructRef,), members)
         KINDS[kind.__name__] = kind
         structref.register(kind)
-        structref.define_constructor(maker, kind, list(fields))
+        way().enter_structure(maker, kind, fields)
