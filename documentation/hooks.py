@@ -19,7 +19,8 @@ ROOT = Path(__file__).resolve().parent.parent
 if str(ROOT) not in sys.path:  # mkdocs loads this file alone
     sys.path.insert(0, str(ROOT))
 
-from documentation import array_tables, case_keys, command_pages, maths  # noqa: E402
+from documentation import array_tables, command_pages, maths  # noqa: E402
+from mdstopo.case import key_tables  # noqa: E402
 from mdstopo.case.schema_case import json_schema  # noqa: E402
 
 _MARK = re.compile(r"^<!-- (keys|keys in space|arrays|commands|exit statuses)(?:: (\w+))? -->$", re.MULTILINE)
@@ -55,9 +56,9 @@ def expanded(markdown: str) -> str:
 
 def _generated(mark: re.Match[str]) -> str:
     if mark[1] == "keys":
-        return case_keys.keys_of("" if mark[2] == "case" else mark[2] or "")
+        return key_tables.keys_of("" if mark[2] == "case" else mark[2] or "")
     if mark[1] == "keys in space":
-        return case_keys.keys_in_space(mark[2] or "")
+        return key_tables.keys_in_space(mark[2] or "")
     if mark[1] == "arrays":
         return array_tables.table_of(mark[2] or "")
     return command_pages.commands() if mark[1] == "commands" else command_pages.exit_statuses()

@@ -128,7 +128,7 @@ def _build_group(
         _note_zero(pairs.zero, pairs.first_zero, first, path, reading)
         return None
     if not len(pairs.length):
-        reading.mistake(path, "the filters leave no member")
+        _note_empty(first, second, path, reading)
         return None
     if laws is None or not fields.good("cost", "design"):
         return None
@@ -165,6 +165,16 @@ def _note_zero(count: int, first_zero: tuple[int, int], first: _End, path: str, 
         path,
         f"{count_text(count)} of the members would have zero length, the first from P "
         f"{first_zero[0]} to Q {first_zero[1]} at [{at}]; move the points or set min_length",
+    )
+
+
+def _note_empty(first: _End, second: _End, path: str, reading: Reading) -> None:
+    """The mistake that no member is within the stated lengths, with the distances that there are."""
+    apart = [np.linalg.norm(second.world - point, axis=1) for point in first.world]
+    least, most = min(float(row.min()) for row in apart), max(float(row.max()) for row in apart)
+    reading.mistake(
+        path,
+        f"min_length and max_length leave no member; the points are {least:.4g} to {most:.4g} m apart",
     )
 
 

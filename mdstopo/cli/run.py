@@ -148,7 +148,9 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
     output.say(f"{case.title or case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")
     rows = []
     for name, value in outcome.objectives.items():
-        rows.append([name, f"{number(outcome.initial_objectives[name], 9)} -> {number(value, 9)}"])
+        begin = outcome.initial_objectives[name]  # NaN where nothing asked for it: a weight of 0
+        first = "not computed" if math.isnan(begin) else number(begin, 9)
+        rows.append([name, f"{first} -> {number(value, 9)}"])
         peaks = outcome.peaks.get(name, ()) if case.uncertainty is None else ()
         # an integral or a mean is of no one time
         rows += [["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in peaks if not math.isnan(t)]
@@ -249,7 +251,9 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     full = int(np.count_nonzero(share >= _GREY[1]))
     if case.n_design:
         gone = case.n_design - full - grey
-        lines.append(("members", f"{full} present, {grey} grey, {gone} absent of {case.n_design}"))
+        # Many small members may share what a few whole ones would do: nothing is "absent" then but by its own range.
+        largest = f"; the largest alpha is {number(outcome.alpha.max(), 3)}" if not full + grey else ""
+        lines.append(("members", f"{full} present, {grey} grey, {gone} absent of {case.n_design}{largest}"))
     if outcome.pricing is not None:
         rounds = f"{outcome.pricing.rounds} round{'s' if outcome.pricing.rounds != 1 else ''}"
         best, together = number(outcome.pricing.best, 2), number(outcome.pricing.together, 2)

@@ -1,4 +1,4 @@
-"""`mdstopo schema`: the JSON Schema of the case format."""
+"""`mdstopo schema`: the JSON Schema of the case format, or the keys of a section in words."""
 
 import json
 from pathlib import Path
@@ -10,11 +10,15 @@ from mdstopo.cli.output import Output
 
 
 @click.command("schema")
+@click.argument("section", required=False)
+@click.option("--space", is_flag=True, help="Of SECTION: the keys of a case in space.")
 @click.option("--out", type=FILE, metavar="FILE", help="Write it to a file.")
-def command(out: Path | None) -> int:
-    """Print the JSON Schema of the case format.
+def command(section: str | None, space: bool, out: Path | None) -> int:
+    """Print the JSON Schema of the case format, or the keys of a SECTION.
 
-    An editor that knows it completes and checks a case while it is typed.
+    An editor that knows the schema completes and checks a case while it is
+    typed. With SECTION, a key of the case such as objectives, its keys are
+    listed in words; `case` lists the sections.
     """
     from mdstopo.case.distributions import BroughtError
     from mdstopo.case.schema_case import ask_distributions, json_schema
@@ -23,7 +27,9 @@ def command(out: Path | None) -> int:
         ask_distributions()
     except BroughtError as error:
         raise click.ClickException(str(error)) from error
-    text = json.dumps(json_schema(), indent=2, ensure_ascii=False)
+    if space and section is None:
+        raise click.UsageError("--space goes with a SECTION")
+    text = json.dumps(json_schema(), indent=2, ensure_ascii=False) if section is None else _keys(section, space)
     if out is None:
         Output().say(text)
         return 0
@@ -34,3 +40,16 @@ def command(out: Path | None) -> int:
     except OSError as error:
         raise StoreError(f"{out}: cannot be written: {error.strerror}") from error
     return 0
+
+
+def _keys(section: str, space: bool) -> str:
+    """The keys of a section of a case, a line or more for each."""
+    from mdstopo.case.key_tables import lines_of, places
+    from mdstopo.case.schema_case import FORMAT
+    from mdstopo.case.schema_space import SPACE_FORMAT
+
+    case = SPACE_FORMAT if space else FORMAT
+    known = {name or "case": name for name, part in places(case).items() if part}
+    if section not in known:
+        raise click.BadParameter(f"no section {section!r}; there are {', '.join(known)}", param_hint="SECTION")
+    return "\n".join(lines_of(known[section], case))

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from mdstopo.case.key_tables import places
+from mdstopo.case.records import Record
+from mdstopo.case.schema_case import FORMAT
+from mdstopo.case.schema_space import SPACE_FORMAT
 from mdstopo.cli.commands import COMMANDS, help_text
 from mdstopo.cli.group import cli, run_group
 
@@ -111,6 +116,25 @@ def test_the_schema_is_json_and_goes_to_a_file(tmp_path: Path, capsys: pytest.Ca
     assert json.loads((tmp_path / "s.json").read_text(encoding="utf-8")) == printed
     assert all("bodies" in printed["else"][part]["properties"] for part in ("then", "else"))  # in space, in the plane
     assert run_group(["schema", "--out", str(tmp_path / "no" / "s.json")]) == 2
+
+
+@pytest.mark.parametrize(("words", "case"), [([], FORMAT), (["--space"], SPACE_FORMAT)])
+def test_every_key_of_a_section_is_told_in_plain_words(
+    words: list[str], case: Record, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for section, part in places(case).items():
+        if not part:
+            continue
+        assert run_group(["schema", section or "case", *words]) == 0
+        told = capsys.readouterr().out
+        for place in part:
+            assert all(f"\n  {key.name}: " in told for key in place.record.keys), place.path
+        assert not re.search(r"<br>|&[gl]t;|`|\]\(", told), section
+
+
+def test_a_section_that_there_is_not_is_told_with_those_that_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_group(["schema", "objectivs"]) == 2
+    assert "no section 'objectivs'; there are case, time, bodies, " in capsys.readouterr().err
 
 
 def test_a_reader_that_leaves_early_is_no_error() -> None:

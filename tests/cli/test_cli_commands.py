@@ -412,3 +412,14 @@ def test_workers_end_when_their_parent_is_killed() -> None:
     while any(Path(f"/proc/{pid}").exists() for pid in workers):
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+def test_where_no_member_is_present_the_largest_alpha_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    less = ["--set", "constraints[0].equals=0.6", "--set", "optimizer.max_iterations=0", "--set", "design.initial=0.05"]
+    assert run_group(["run", "probe.yaml", *less]) == 0
+    assert "0 present, 0 grey, 12 absent of 12; the largest alpha is 0.05\n" in capsys.readouterr().out
+    assert (
+        run_group(["run", "probe.yaml", *less, "--set", "design.initial=0.4", "--set", "constraints[0].equals=4.8"])
+        == 0
+    )
+    assert "0 present, 12 grey, 0 absent of 12\n" in capsys.readouterr().out

@@ -10,8 +10,9 @@ import pytest
 
 pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install -e '.[docs]'")
 
-from documentation import array_tables, case_keys, command_pages, maths
+from documentation import array_tables, command_pages, maths
 from documentation.hooks import expanded
+from mdstopo.case import key_tables
 from mdstopo.case.schema_case import FORMAT, json_schema
 from mdstopo.cli.commands import COMMANDS, EXIT_STATUSES
 from mdstopo.cli.group import cli
@@ -20,7 +21,7 @@ from .pages import DOCS, blocks, data, is_case
 
 KEYS = [
     (f"{place.path}.{key.name}".lstrip("."), key)
-    for part in case_keys.places().values()
+    for part in key_tables.places().values()
     for place in part
     for key in place.record.keys
 ]
@@ -66,12 +67,12 @@ def test_every_property_of_the_schema_has_a_description_for_editors() -> None:
 
 def test_every_kind_of_joint_law_and_grid_and_every_mapping_is_explained() -> None:
     assert [
-        place.path for part in case_keys.places().values() for place in part if place.path and not place.record.doc
+        place.path for part in key_tables.places().values() for place in part if place.path and not place.record.doc
     ] == []
 
 
 def test_every_word_of_a_key_is_explained() -> None:
-    words = [(path, case_keys.words_of(key.kind)) for path, key in KEYS]
+    words = [(path, key_tables.words_of(key.kind)) for path, key in KEYS]
     several = [(path, word) for path, word in words if word is not None and len(word.words) > 1]
     assert len(several) > 8
     assert [path for path, word in several if not all(word.meanings)] == []
@@ -97,7 +98,7 @@ def test_every_section_of_a_case_has_an_example() -> None:
 
 @pytest.mark.parametrize("section", ["members", "joints", "points", "objectives"])
 def test_every_alternative_stands_in_an_example(section: str) -> None:
-    known = {place.path.split(".")[-1] for place in case_keys.places()[section] if place.path.count(".") >= 1}
+    known = {place.path.split(".")[-1] for place in key_tables.places()[section] if place.path.count(".") >= 1}
     words = {
         "members": {"spring", "gap", "cubic", "curve", "pulse", "table", "actuator", "inerter"},
         "joints": {"revolute", "prismatic", "fixed", "distance"},

@@ -1,5 +1,6 @@
-"""The keys of a case as Markdown, from the definitions that the reader and the JSON Schema are made of."""
+"""The keys of a case as Markdown and as plain lines, from the definitions that reader and JSON Schema are made of."""
 
+import html
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -85,6 +86,28 @@ def _parts(kind: Kind) -> list[Kind]:
     if isinstance(kind, ByShape):
         return [part for part in (kind.scalar, kind.sequence, kind.mapping) if part is not None]
     return []
+
+
+def lines_of(section: str, case: Record = FORMAT) -> list[str]:
+    """The same as plain lines, for a terminal."""
+    known = places(case)
+    lines = []
+    for place in known[section]:
+        title = place.path or "the case itself"
+        lines += ["", f"{title}: {place.record.what}" if place.path else title]
+        lines += [f"  {_unmarked(text)}" for text in (*_rules(place.record),) if text]
+        for key in place.record.keys:
+            unit = f", {key.unit}" if key.unit else ""
+            default = "required" if key.required else f"default {_unmarked(_default(key))}"
+            lines.append(f"  {key.name}: {_unmarked(_value(key.kind, {}, ''))}{unit}; {default}")
+            lines += [f"      {_unmarked(part)}" for part in _meaning(key).split("<br>")]
+    return lines[1:]
+
+
+def _unmarked(cell: str) -> str:
+    """A cell of a table without the marks of Markdown."""
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", cell).replace("`", "").replace("\\", "")
+    return html.unescape(text)
 
 
 def _told(place: Place, anchors: dict[int, str]) -> str:
