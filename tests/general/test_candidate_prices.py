@@ -11,6 +11,7 @@ from mdstopo.case import candidates
 from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
+from mdstopo.general.priced_candidates import FIRST_STAGE, KIND, POINT
 from mdstopo.sensitivity.springs_candidate_prices import ERROR
 from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
 from tests.sensitivity.test_candidate_prices import assert_dense_pass_is_right
@@ -259,6 +260,15 @@ def test_prices_in_space_of_laws_that_switch_come_to_the_gradient_as_steps_becom
     assert short <= long / 256.0
 
 
+def test_prices_know_members_that_begin_to_act_at_the_very_instant_of_a_peak():
+    """The acceleration is largest right when crushable legs that are too long begin to pull."""
+    law = {"type": "crush", "stiffness": 900, "force": 40, "side": "tension", "free_length": 0.6, "active_from": 0.1}
+    scene = Priced(arm(law, **looked(PUSH, "max")))
+    (states,) = scene.states.scenes
+    assert 0.1 in states.when[states.steps.step[states.steps.step[:, KIND] == POINT, FIRST_STAGE]]
+    assert scene.error <= 1e-8
+
+
 def test_the_price_of_mirror_images_is_the_sum_of_theirs():
     """Two groups with one alpha for a member and its image: the gradient by that alpha."""
     scene = arm(law={**SPRING, "damping": 7})
@@ -472,6 +482,37 @@ def test_passes_over_random_tiles_know_what_each_of_their_candidates_is_worth(se
     looks = [ENERGY, looked("energy", "mean"), looked(PULL, "max"), looked(PUSH, "rms"), STOP, {}]
     scene = dense(arm(random_law(rng), **looks[rng.integers(len(looks))]), 10.0 ** rng.uniform(-2.5, -0.5))
     assert_pass_is_right(*states_of(scene, 0.2))
+
+
+def test_a_member_that_is_crushed_stays_elastic_where_a_node_lies_right_behind_the_end_of_crushing():
+    """Its elongation is at the plateau there, to rounding, and it is not crushed again. Prices of members side by side
+    are smooth in where their ends are."""
+    law = {
+        "type": "crush", "stiffness": 3883.8691187044637, "force": 31.5617416794616, "side": "compression",
+        "gap": 0.0060288445393175075, "free_length": 0.8039556220960358,
+    }  # fmt: skip
+    scene = arm(law, **looked(PUSH, "rms"))
+    turn = 0.002481637740336769
+    arc = {"center": [0.6000000000000001, -0.3], "radius": 0.3, "from": -turn, "to": turn, "count": 200}
+    line = {"from": [1.2, -1.1], "to": [1.2006541199315484, -1.0985939476393867], "count": 31}
+    scene["points"]["p"]["grid"], scene["points"]["q"]["grid"] = {"arc": arc}, {"line": line}
+    candidates, states = states_of(scene, 0.0)
+    assert_pass_is_right(candidates, states)
+    columns = np.arange(138, 159)
+    prices = candidates.prices_between(states, np.full(len(columns), 28), columns)
+    smooth = np.polynomial.Chebyshev.fit(columns, prices, 8)
+    assert np.abs(smooth(columns) - prices).max() <= 1e-12 * np.abs(prices).max()
+
+
+def test_a_pass_knows_members_that_are_crushed_in_steps_so_short_that_rounding_decides():
+    """Members that are built switch one 1e-8 s behind the other, and virtual changes in the steps between all but
+    cancel."""
+    law = {"type": "crush", "stiffness": 3600, "force": 21, "side": "compression", "gap": 0.049, "active_from": 0.0385}
+    scene = free(law)
+    scene["members"]["web"] |= {"from": "q", "to": "p"}
+    scene["points"]["p"]["grid"] = {"rectangle": {"center": [0.9, -0.3], "size": [1.25, 0.87], "count": 4}}
+    scene["points"]["q"]["grid"] = {"lattice": {"from": [1.2, -1.1], "to": [1.5, -1.08], "count": [8, 8]}}
+    assert_pass_is_right(*states_of(scene, 0.36, step=0.01, integrator="runge_kutta"))
 
 
 def test_a_dense_pass_in_space_by_legs_that_are_crushed_knows_all_prices():

@@ -235,9 +235,9 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             curves[number, : len(scene.model.curves)] = scene.model.curves
             points.append(self._points(scene, place, chosen))
             for run in _runs(scene, place):
-                code, before, from_start, modes = run.row
+                code, before, modes = run.row
                 ends = state + len(run.when), step + len(run.step)
-                rows.append([number, code, state, state + before, ends[0], step, ends[1], from_start, modes])
+                rows.append([number, code, state, state + before, ends[0], step, ends[1], modes])
                 run.step[:, :FIRST_NODE] += state
                 run.step[:, FIRST_NODE] += node
                 runs.append(run)
@@ -282,11 +282,10 @@ class GeneralCandidates(CandidatePass[PricingStates]):
 class _Run(NamedTuple):
     """A row of `priced_candidates.PricedCandidates.run` with its states, steps and nodes; each as there.
 
-    row: the law's code, how many states there are before the first one whose energy counts, whether it acts from the
-    start, and which modes it has.
+    row: the law's code, how many states there are before the first one whose energy counts, and which modes it has.
     """
 
-    row: tuple[int, int, int, int]
+    row: tuple[int, int, int]
     rest: float
     law: FloatArray
     pose: FloatArray
@@ -340,7 +339,7 @@ def _run_of(scene: ScenePricingStates, k: int, record: Law) -> _Run:
     else:
         parts = _steps_of_law(steps, model, k, pair, kinematics)
     return _Run(
-        (code, before, int(model.active[0, k]), modes), -1.0 if free is None else float(free), model.law[k],
+        (code, before, modes), -1.0 if free is None else float(free), model.law[k],
         pose[:, None], change[:, None], scene.pose_a[states, pair], scene.energy[states],
         scene.when[states], level, frame if modes != NONE else np.zeros_like(frame), *parts,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from mdstopo.general.model.bundles import bundle
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: columns of `PricedCandidates.run`
-SCENE, CODE, FIRST_STATE, FIRST_ENERGY, LAST_STATE, FIRST_STEP, LAST_STEP, FROM_START, MODES = range(9)
+SCENE, CODE, FIRST_STATE, FIRST_ENERGY, LAST_STATE, FIRST_STEP, LAST_STEP, MODES = range(8)
 #: the modes of a law: none, or of no account; those in which its members are followed through the steps; pieces of one
 #: function, of which one counts at a state
 NONE, FOLLOWED, PIECES = range(3)
@@ -42,10 +42,10 @@ class PricedCandidates(NamedTuple):
     run: Annotated[
         IndexArray,
         Field(
-            "n_run, 9",
+            "n_run, 8",
             "of the states in which one law of one scene is evaluated: the scene; the law's code; the first state, the "
             "first one whose energy counts, and the one behind all; of a law that switches the first step, and the one "
-            "behind all; whether it acts from the start; which modes it has (NONE and so on)",
+            "behind all; which modes it has (NONE and so on)",
         ),
     ]
     rest: Annotated[FloatArray, Field("n_run", "the law's free length (m); negative: the length as stated")]

@@ -20,8 +20,10 @@ from mdstopo.general.pricing.switching_together import is_quick
 from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, RATE, WORKS, member_works
 from mdstopo.mechanics.laws.law_table import (
     law_first_set,
+    law_makes_set,
     law_margin,
     law_margin_slopes,
+    law_next,
     law_remembers,
     law_start,
 )
@@ -130,8 +132,8 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
                 for i in range(size * TALL):
                     works[m, ELONGATION, i] -= kept[_place(first, i)]
     count = np.int64(0)
-    if is_quick(code, p, model.curves):
-        count = _fill_tried(code, p, model.curves, candidates.step_time[s, 0], size, sorting)
+    if is_quick(code, p, model.curves) and (known or not law_remembers(code)):
+        count = _fill_tried(code, p, model.curves, candidates.step_time[s, 0], first, size, known, begin, sorting)
     for i in range(0, size * TALL, lanes()):
         # a bit for each lane
         left = (1 << max(min(height - i % TALL, lanes()), 0)) - 1
@@ -139,8 +141,9 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
             bits = _stay_in(n, i, sorting) & left
             for lane in range(lanes() if bits != 0 else 0):
                 at = _place(first, i + lane)
-                if (bits >> lane) & 1 == 1:
-                    kind[at] = join_class(tried[n], tried[n], 1, classes)
+                if (bits >> lane) & 1 == 1 and (not known or begin[at] == tried[n]):
+                    own = join_class(tried[n], tried[n], 1, classes)
+                    kind[at] = own
                     left &= ~(1 << lane)
         for lane in range(lanes() if left != 0 else 0):
             if (left >> lane) & 1 == 1:
@@ -159,14 +162,14 @@ def _place(first, i):
 
 
 @part
-def _fill_tried(code, p, curves, t, size, sorting):
+def _fill_tried(code, p, curves, t, first, size, known, begin, sorting):
     """Modes in which some members may stay, and tangents of their margins at the corners of the range of elongations
     and rates of all members.
 
     Within the range a margin is the least of its tangents at the corners, being the lesser of two linear functions.
 
     code, p (8,), curves, t: the law, numbers of all laws, and any time (s), on which the law does not depend.
-    size: how many columns there are.
+    first, size, known, begin: as of `sort_members`.
     sorting: of `make_sorting`, with what the members do; the modes and the tangents are set.
 
     Returns how many modes there are; 0 where bounds tell the modes at all nodes, so that no range is known.
@@ -182,8 +185,11 @@ def _fill_tried(code, p, curves, t, size, sorting):
     count = np.int64(0)
     if box[0] > box[1]:
         return count
-    for i in range(CORNERS):
-        now = np.int64(law_start(code, p, box[i // 2], box[2 + i % 2], 0.0, t, curves, 1.0))
+    for i in range(size * TALL if known else CORNERS):
+        if known:
+            now = begin[_place(first, i)]
+        else:
+            now = np.int64(law_start(code, p, box[i // 2], box[2 + i % 2], 0.0, t, curves, 1.0))
         new = count < TRIED
         for n in range(count):
             new = new and tried[n] != now
@@ -260,8 +266,11 @@ def _modes_of(code, p, curves, rest, time, old, mode, works, i):
             if law_margin(code, p, x, rate, now, t, curves, rest) >= 0.0:
                 continue
             if law_remembers(code):
-                return unsure, unsure  # its permanent set may change: it is followed by itself
-            new = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+                new = np.int64(law_next(code, p, x, rate, 0.0, now, t, curves, rest))
+            else:
+                new = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
+            if law_makes_set(code, now, new) and now == old:
+                return old, new  # `switching_together` looks at what is behind
             if new == now or not law_margin(code, p, x, rate, new, t, curves, rest) >= 0.0:
                 return unsure, unsure
         if now != old:

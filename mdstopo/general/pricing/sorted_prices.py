@@ -96,7 +96,7 @@ def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile,
         if stays and smooth and classes[c, COUNT] > FEW and not law_is_idle(code, classes[c, FROM]):
             done += _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price)
         if classes[c, COUNT] > 0 and (stays or is_quick(code, candidates.law[k], model.curves)):
-            done += _price_each(model, candidates, k, s, first, size, c, height, to, buffers, price)
+            done += _price_each(model, candidates, k, s, first, size, c, height, to, tile[3], buffers, price)
         else:
             for m in range(_places_of(kind, c, first, size, height, places)):
                 kind[places[m]] = UNSORTED
@@ -195,13 +195,14 @@ def _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price
 
 
 @kernel
-def _price_each(model, candidates, k, s, first, size, c, height, to, buffers, price):
+def _price_each(model, candidates, k, s, first, size, c, height, to, error, buffers, price):
     """Price the members of a class one by one, in vectors. Those for which that does not do are UNSORTED then.
 
     model, candidates, k, s, first, size, buffers, price: as of `price_part`.
     c: the class.
     height: rows of the tile.
     to: the row for modes behind the step.
+    error: by which a price may be off.
 
     Returns how many prices were computed.
     """
@@ -218,10 +219,13 @@ def _price_each(model, candidates, k, s, first, size, c, height, to, buffers, pr
     if old != new:
         for at in range(0, count, TOGETHER):
             wide = min(TOGETHER, count - at)
+            for m in range(wide):
+                switching[5][0, m] = sets[0, places[at + m]]
             take_members(model, places[at : at + wide], wide, np.int64(TOGETHER))
-            price_switched(model, candidates, k, wide, s, old, new, switching)
+            price_switched(model, candidates, k, wide, s, old, new, error, switching)
             for m in range(wide):
                 b = places[at + m]
+                fresh[b] = switching[5][1, m]
                 if switching[4][SUM, m] == switching[4][SUM, m]:
                     price[b] += switching[4][SUM, m]
                     modes[to, b] = new

@@ -16,7 +16,6 @@ from mdstopo.general.model.priced_candidates import (
     FIRST_NODE,
     FIRST_STAGE,
     FIRST_STEP,
-    FROM_START,
     KIND,
     LAST_STAGE,
     LAST_STEP,
@@ -71,6 +70,9 @@ ROW = 16
 NOWHERE = -1
 #: a margin below this leaves open in which mode a member begins, and its second derivative decides (m, m/s or a part)
 CLOSE = 1e-6
+#: a mode is over where its margin is below zero by more than rounding, this part of 1 m and the member's length: right
+#: behind a switch the margin of the new mode is zero, and nodes there would end it again
+ROUNDING = 4e-15
 
 
 @kernel
@@ -103,7 +105,7 @@ def price_followed(model, candidates, k, at, count, following, price):
     sets = following[5]
     modes[:] = 0
     sets[:] = 0.0
-    begun = run[FROM_START] == 0  # a law that acts later begins in mode 0, unset
+    begun = np.bool_(False)
     ends = np.int64(0)
     for s in range(run[FIRST_STEP], run[LAST_STEP]):
         kind = candidates.step[s, KIND]
@@ -435,10 +437,11 @@ def _first_over(code, p, curves, rest, time, node, begin, mode, kept):
     begin: the fraction.
     mode, kept: the mode, and the permanent set (m).
     """
+    over = -ROUNDING * (1.0 + rest + abs(node[ELONGATION, 0]))
     for m in range(1, NODES):
         if NODE[m] > begin:
             t = time[0] + NODE[m] * time[1]
-            if law_margin(code, p, node[ELONGATION, m] - kept, node[RATE, m], mode, t, curves, rest) < 0.0:
+            if law_margin(code, p, node[ELONGATION, m] - kept, node[RATE, m], mode, t, curves, rest) < over:
                 return m
     return NODES
 

@@ -14,18 +14,20 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import inverse_root, lanes, load, store, zero
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, MOVES, NODE, NODES, POWERS
-from mdstopo.general.pricing.switching_prices import GAUSS, LOCATED, NODE_ROWS, at_places, fill_law
+from mdstopo.general.pricing.switching_prices import GAUSS, LOCATED, NODE_ROWS, ROUNDING, at_places, fill_law, range_of
 from mdstopo.mechanics.kinematics.kinematics_interface import ALONG, ELONGATION, RATE, WORKS, member_works
 from mdstopo.mechanics.laws.law_table import (
+    law,
     law_degree,
     law_is_given,
     law_is_idle,
     law_is_timed,
     law_lacks_rate,
+    law_makes_set,
     law_margin,
     law_margin_slopes,
     law_next,
-    law_remembers,
+    law_set,
 )
 
 #: members that are followed at once
@@ -42,28 +44,25 @@ GONE = 1e-10
 @kernel
 def make_switching():
     """What following many members needs: what they do at nodes; polynomials through these, of the margin, and of a law;
-    what is found of each member."""
+    what is found of each member; permanent sets, and those that are made."""
     return (
         np.zeros((NODES, WORKS, TOGETHER)),
         np.zeros((NODE_ROWS, NODES, TOGETHER)),
         np.zeros((NODES, TOGETHER)),
         np.zeros((4, 5)),
         np.zeros((5, TOGETHER)),
+        np.zeros((2, TOGETHER)),
     )
 
 
 @part
 def is_quick(code, p, curves):
-    """Whether members of a law may be followed together: in a mode it is a polynomial, and it knows no time.
-
-    Not of a law that remembers: one price in 6,000 of a random scene was 3e-10 off so, for a reason not known.
-    """
-    timed = law_is_timed(code, p, curves) or law_is_given(code) or law_lacks_rate(code)
-    return law_degree(code) > 0 and not timed and not law_remembers(code)
+    """Whether members of a law may be followed together: in a mode it is a polynomial, and knows no time."""
+    return law_degree(code) > 0 and not (law_is_timed(code, p, curves) or law_is_given(code) or law_lacks_rate(code))
 
 
 @kernel
-def price_switched(model, candidates, k, count, s, old, new, switching):
+def price_switched(model, candidates, k, count, s, old, new, error, switching):
     """What members do in a step in which they leave one mode for another, and none for a third one.
 
     In:
@@ -72,10 +71,12 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
       count: how many there are, TOGETHER at most.
       s: the number of the step.
       old, new: the modes.
+      error: by which a price may be off.
     In place:
-      switching: of `make_switching`: of what is found SUM counts, NaN where a member has to be followed by itself.
+      switching: of `make_switching`: sets in row 0 are those with which members begin; of what is found SUM counts, NaN
+        where a member has to be followed by itself; sets in row 1 are those with which they end.
     """
-    works, power, margin, _, found = switching
+    works, power, margin, _, found, sets = switching
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     time = candidates.step_time[s]
@@ -83,6 +84,13 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
     for m in range(NODES):
         o = candidates.step[s, FIRST_NODE] + m
         member_works(model, np.int64(0), count, candidates.node_pose[o], candidates.node_change[o], works[m])
+        for i in range(0, count, lanes()):
+            store(works[m, ELONGATION], i, load(works[m, ELONGATION], i) - load(sets[0], i))
+    if _worth_of_rounding(model, candidates, k, count, s, old, new, works) > error:
+        for i in range(count):
+            found[SUM, i] = np.nan
+            sets[1, i] = sets[0, i]
+        return
     by_x, by_rate, rest = _linear_margin(code, p, model.curves, free[0], time, old, works)
     for i in range(0, count, lanes()):
         for a in range(NODES):
@@ -96,6 +104,7 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
     _locate(count, by_x, by_rate, rest, works, margin, found)
     for i in range(0, count, lanes()):
         store(found[SUM], i, zero())
+        store(sets[1], i, load(sets[0], i))
     for i in range(count):
         _check(code, p, model.curves, free[i], time, old, new, i, switching)
     if candidates.step[s, MOVES] != 0:
@@ -103,15 +112,41 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
 
 
 @part
+def _worth_of_rounding(model, candidates, k, count, s, old, new, works):
+    """What rounding of the elongation may be worth in the integral over a step.
+
+    In a step of some 1e-8 s, between two switches of members that are built, virtual changes may be large and all but
+    cancel. Then prices are those of members that are followed one by one only where both round alike.
+
+    model, candidates, k, count, s, old, new: as of `price_switched`.
+    works (NODES, WORKS, TOGETHER): what the members do at the nodes.
+    """
+    code = candidates.run[k, CODE]
+    stiffness = 0.0
+    rest = model.member[MEMBER_FREE_LENGTH, 0]
+    x = works[0, ELONGATION, 0]
+    for mode in (old, new):
+        _, by_x, _, _, _ = law(
+            code, candidates.law[k], x, works[0, RATE, 0], mode, candidates.step_time[s, 0], 0.0, model.curves, rest
+        )  # fmt: skip
+        stiffness = max(stiffness, abs(by_x))
+    most = 0.0
+    for m in range(NODES):
+        low, high = range_of(works[m, ALONG], count)
+        most = max(most, -low, high)
+    return ROUNDING * (1.0 + rest + abs(x)) * stiffness * most
+
+
+@part
 def _check(code, p, curves, rest, time, old, new, i, switching):
-    """Set the SUM of a member to NaN where its switch is not the one that is meant.
+    """Set the permanent set with which a member ends, and its SUM to NaN where its switch is not the one that is meant.
 
     code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
     time (2,): start and length of the step (s).
     old, new, switching: as of `price_switched`.
     i: the member.
     """
-    _, power, _, _, found = switching
+    works, power, _, _, found, sets = switching
     c = found[AT, i]
     x = _of_member(power[ELONGATION], c, i)
     rate = _of_member(power[RATE], c, i)
@@ -124,6 +159,15 @@ def _check(code, p, curves, rest, time, old, new, i, switching):
         or law_next(code, p, x, rate, second, old, t, curves, rest) != new
     ):
         found[SUM, i] = np.nan
+    if not law_makes_set(code, old, new):
+        return
+    growth = law_set(code, p, x, old, new)
+    sets[1, i] += growth
+    for m in range(1, NODES):
+        x = works[m, ELONGATION, i] - growth
+        t = time[0] + NODE[m] * time[1]
+        if NODE[m] > c and law_margin(code, p, x, works[m, RATE, i], new, t, curves, rest) < 0.0:
+            found[SUM, i] = np.nan
 
 
 @part
@@ -201,7 +245,7 @@ def _add_pieces(model, candidates, k, s, count, old, new, switching):
 
     model, candidates, k, s, count, old, new, switching: as of `price_switched`.
     """
-    works, power, _, law_power, found = switching
+    works, power, _, law_power, found, sets = switching
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     first = candidates.step[s, FIRST_NODE]
@@ -214,6 +258,17 @@ def _add_pieces(model, candidates, k, s, count, old, new, switching):
         mode = old if piece == 0 else new
         if law_is_idle(code, mode):
             continue
+        if piece == 1:
+            least = np.inf
+            most = -np.inf
+            for i in range(count):  # without those that have to be followed by themselves, whose sets may be anything
+                if found[SUM, i] == found[SUM, i]:
+                    least = min(least, sets[1, i] - sets[0, i])
+                    most = max(most, sets[1, i] - sets[0, i])
+            if least > most:
+                return
+            low -= most
+            high -= least
         middle, inverse, by_rate, places = fill_law(
             code, p, model.curves, candidates.step_time[s, 0], 0.0, low, high, mode, law_power[2:], law_power
         )  # fmt: skip
@@ -223,10 +278,11 @@ def _add_pieces(model, candidates, k, s, count, old, new, switching):
             if piece == 1:
                 begin = wide
                 wide = 1.0 - wide
+            growth = load(sets[1], i) - load(sets[0], i) if piece == 1 else zero()
             total = zero()
             for g in range(GAUSS.shape[1]):
                 u = (begin + wide * GAUSS[0, g]) * 2.0 - 1.0
-                x = (_at(power[ELONGATION], u, i) - middle) * inverse
+                x = ((_at(power[ELONGATION], u, i) - growth) - middle) * inverse
                 work = at_places(law_power[0], places, x)
                 if by_rate != 0.0:
                     work += by_rate * _at(power[RATE], u, i)

@@ -19,7 +19,6 @@ from mdstopo.general.model.priced_candidates import (
     FIRST_STATE,
     FIRST_STEP,
     FOLLOWED,
-    FROM_START,
     KIND,
     LAST_STAGE,
     LAST_STATE,
@@ -118,7 +117,7 @@ def price_run(model, candidates, k, tile, scratch, lists, price):
     todo[LOADED] = 0
     followed = run[MODES] == FOLLOWED
     steps = run[LAST_STEP] - run[FIRST_STEP] if followed else run[LAST_STATE] - run[FIRST_STATE]
-    begun = run[FROM_START] == 0
+    begun = np.bool_(False)
     # where members that remember are at a state alone: behind a part of a step, or behind the last step
     ends = np.int64(0)
     done = 0.0
