@@ -85,7 +85,7 @@ DAMPING = 1
 #: places of the arguments that may be others at each evaluation: of `_simulate_arguments` `tangent`, of
 #: `_plain_arguments` `count` and `window`
 TANGENT_AT = 4
-COUNT_AT, WINDOW_AT = 6, 10
+COUNT_AT, WINDOW_AT = 6, 11
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -305,8 +305,8 @@ class GeneralDriver:
         if message:
             status = Status.ROTATION_JUMP
         elif code == OK:
-            if gradient and self._plain_peaks and across is None:
-                differentiated = self._find_peaks_with_gradients(count, window)
+            if gradient and self._plain_rows and across is None:
+                differentiated = self._find_rows_with_gradients(count, window)
             else:
                 differentiated = False
                 for j, reduction in enumerate(self.scene.reductions):
@@ -419,15 +419,17 @@ class GeneralDriver:
             rows[:found, VALUE] *= rows[:found, SIGN]
 
     @cached_property
-    def _plain_peaks(self) -> bool:
-        """Whether there is one response, of which peaks are meant, and their derivatives are sweeps of their own."""
+    def _plain_rows(self) -> bool:
+        """Whether there is one response, of which peaks or the end are meant, and derivatives are sweeps of their
+        own."""
         if len(self.scene.reductions) != 1 or self.start is not None:
             return False
         (reduction,), model = self.scene.reductions, self.scene.model
-        plain = not compete(model.response[0, 0], reduction) and switches_of(model, 0) == 0
-        return reduction.is_largest and plain and self.rows.shape[1] * len(self.padded) <= BLOCK
+        plain = reduction.at_end or (reduction.is_largest and switches_of(model, 0) == 0)
+        plain = plain and not compete(model.response[0, 0], reduction)
+        return plain and self.rows.shape[1] * len(self.padded) <= BLOCK
 
-    def _find_peaks_with_gradients(self, count: int, window: float) -> bool:
+    def _find_rows_with_gradients(self, count: int, window: float) -> bool:
         """Rows of the only response, with their gradients; False where these are still to be found."""
         (reduction,) = self.scene.reductions
         found, differentiated = self.ready.often(
@@ -441,10 +443,11 @@ class GeneralDriver:
 
     def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:
         """All arguments of `peaks_vjp`; count and window stand at `COUNT_AT` and `WINDOW_AT`."""
-        both = self.scene.reductions[0].is_magnitude
+        (reduction,) = self.scene.reductions
         return (
-            *self.steps_arguments(count), 0, both, self.steps_are_fine, window, self.room, self.room_ints,
-            self.member_state, self._swept, self._rows_of[0], self._gradients_of[0], self.work,
+            *self.steps_arguments(count), 0, reduction.is_magnitude, reduction.at_end, self.steps_are_fine, window,
+            self.room, self.room_ints, self.member_state, self._swept, self._rows_of[0], self._gradients_of[0],
+            self.work,
         )  # fmt: skip
 
     def _peaks_of_steps(self, j: int, both: bool, count: int, window: float) -> int:
@@ -606,7 +609,7 @@ class GeneralDriver:
         A process that does so beside one that compiles the steps takes half of the work from it.
         """
         entry, reductions = self.entry, self.scene.reductions
-        if self._plain_peaks:
+        if self._plain_rows:
             entry.peaks_vjp.compile(*self._plain_arguments(0, 0.0))
             return
         if not all(reduction.is_integral for reduction in reductions):
