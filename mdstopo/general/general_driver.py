@@ -402,15 +402,16 @@ class GeneralDriver:
         switched = switches_of(self.scene.model, j) > 0 and not reduction.at_end
         if not competing and not switched and reduction.is_largest:
             found = self._peaks_of_steps(j, reduction.is_magnitude, count, window)
+        elif not competing and reduction.at_end:
+            value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
+            rows[0] = row_of(self.states()[0].item(count), value, count - 1, 1.0, rate, 1.0, who)
+            found = 1
         else:
             t = self.states()[0][: count + 1].copy()
             if switched:
                 candidates = switched_peaks(self, j, Pieces(self, j, t), reduction.signs, window)
             elif competing:
                 candidates = members_peaks(self, j, t, reduction.at_end, window, len(rows))
-            elif reduction.at_end:
-                value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
-                candidates = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
             else:
                 candidates = list(minima(self, j, t))
             found = self.entry.rank_rows(np.array(candidates), window, float(t[-1] - t[0]), rows)
