@@ -11,7 +11,7 @@ from mdstopo.case import candidates
 from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.general.priced_candidates import FIRST_STAGE, KIND, POINT
+from mdstopo.general.model.priced_candidates import FIRST_STAGE, KIND, POINT
 from mdstopo.sensitivity.springs_candidate_prices import ERROR
 from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
 from tests.sensitivity.test_candidate_prices import assert_dense_pass_is_right

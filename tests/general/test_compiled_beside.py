@@ -33,11 +33,12 @@ MEAN = ("max_abs", "mean")
     ("text", "names"),
     [
         (CASE, {"peaks_vjp"}),
+        (CASE.replace("max_abs", "final"), {"peaks_vjp"}),
         (CASE.replace(*MEAN), {"integral_with_gradient"}),
         (CASE + SECOND + TOGETHER, {"rows_vjp", "peaks_of_steps"}),
         (CASE + SECOND.replace(*MEAN) + TOGETHER, {"rows_vjp", "peaks_of_steps", "integral_with_gradient"}),
     ],
-    ids=["peak", "mean", "peaks", "peak and mean"],
+    ids=["peak", "end", "mean", "peaks", "peak and mean"],
 )
 def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch, text: str, names: set[str]) -> None:
     engine = Evaluator(read_case(text))

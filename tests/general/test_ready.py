@@ -77,7 +77,7 @@ def test_arrays_stay_where_those_that_are_looked_at_stay(evaluator):
 
     def run(design, **asked):
         assert evaluator.evaluate(design, **asked).status.ok
-        assert driver._plain_peaks
+        assert driver._plain_rows
         looked_at = driver.ready, driver.floats, driver.rows
         return *looked_at, *driver._simulate_arguments(True), *driver._plain_arguments(1, 0.125)
 

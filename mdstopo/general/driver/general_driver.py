@@ -85,7 +85,7 @@ DAMPING = 1
 #: places of the arguments that may be others at each evaluation: of `_simulate_arguments` `tangent`, of
 #: `_plain_arguments` `count` and `window`
 TANGENT_AT = 4
-COUNT_AT, WINDOW_AT = 6, 10
+COUNT_AT, WINDOW_AT = 6, 11
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -305,8 +305,8 @@ class GeneralDriver:
         if message:
             status = Status.ROTATION_JUMP
         elif code == OK:
-            if gradient and self._plain_peaks and across is None:
-                differentiated = self._find_peaks_with_gradients(count, window)
+            if gradient and self._plain_rows and across is None:
+                differentiated = self._find_rows_with_gradients(count, window)
             else:
                 differentiated = False
                 for j, reduction in enumerate(self.scene.reductions):
@@ -402,15 +402,16 @@ class GeneralDriver:
         switched = switches_of(self.scene.model, j) > 0 and not reduction.at_end
         if not competing and not switched and reduction.is_largest:
             found = self._peaks_of_steps(j, reduction.is_magnitude, count, window)
+        elif not competing and reduction.at_end:
+            value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
+            rows[0] = row_of(self.states()[0].item(count), value, count - 1, 1.0, rate, 1.0, who)
+            found = 1
         else:
             t = self.states()[0][: count + 1].copy()
             if switched:
                 candidates = switched_peaks(self, j, Pieces(self, j, t), reduction.signs, window)
             elif competing:
                 candidates = members_peaks(self, j, t, reduction.at_end, window, len(rows))
-            elif reduction.at_end:
-                value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
-                candidates = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
             else:
                 candidates = list(minima(self, j, t))
             found = self.entry.rank_rows(np.array(candidates), window, float(t[-1] - t[0]), rows)
@@ -419,15 +420,17 @@ class GeneralDriver:
             rows[:found, VALUE] *= rows[:found, SIGN]
 
     @cached_property
-    def _plain_peaks(self) -> bool:
-        """Whether there is one response, of which peaks are meant, and their derivatives are sweeps of their own."""
+    def _plain_rows(self) -> bool:
+        """Whether there is one response, of which peaks or the end are meant, and derivatives are sweeps of their
+        own."""
         if len(self.scene.reductions) != 1 or self.start is not None:
             return False
         (reduction,), model = self.scene.reductions, self.scene.model
-        plain = not compete(model.response[0, 0], reduction) and switches_of(model, 0) == 0
-        return reduction.is_largest and plain and self.rows.shape[1] * len(self.padded) <= BLOCK
+        plain = reduction.at_end or (reduction.is_largest and switches_of(model, 0) == 0)
+        plain = plain and not compete(model.response[0, 0], reduction)
+        return plain and self.rows.shape[1] * len(self.padded) <= BLOCK
 
-    def _find_peaks_with_gradients(self, count: int, window: float) -> bool:
+    def _find_rows_with_gradients(self, count: int, window: float) -> bool:
         """Rows of the only response, with their gradients; False where these are still to be found."""
         (reduction,) = self.scene.reductions
         found, differentiated = self.ready.often(
@@ -441,10 +444,11 @@ class GeneralDriver:
 
     def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:
         """All arguments of `peaks_vjp`; count and window stand at `COUNT_AT` and `WINDOW_AT`."""
-        both = self.scene.reductions[0].is_magnitude
+        (reduction,) = self.scene.reductions
         return (
-            *self.steps_arguments(count), 0, both, self.steps_are_fine, window, self.room, self.room_ints,
-            self.member_state, self._swept, self._rows_of[0], self._gradients_of[0], self.work,
+            *self.steps_arguments(count), 0, reduction.is_magnitude, reduction.at_end, self.steps_are_fine, window,
+            self.room, self.room_ints, self.member_state, self._swept, self._rows_of[0], self._gradients_of[0],
+            self.work,
         )  # fmt: skip
 
     def _peaks_of_steps(self, j: int, both: bool, count: int, window: float) -> int:
@@ -606,7 +610,7 @@ class GeneralDriver:
         A process that does so beside one that compiles the steps takes half of the work from it.
         """
         entry, reductions = self.entry, self.scene.reductions
-        if self._plain_peaks:
+        if self._plain_rows:
             entry.peaks_vjp.compile(*self._plain_arguments(0, 0.0))
             return
         if not all(reduction.is_integral for reduction in reductions):

@@ -103,14 +103,53 @@ NO_SHIFT, OF_STEP = range(2)
 def make_workspace(model):
     """A workspace for one state. Most of it lies in one piece: forty pieces would take two microseconds to make."""
     n = model.mass.shape[0]
-    n_pair = model.pair.shape[0]
-    n_joint = model.joint.shape[0]
-    total = model.unknown_index.shape[0]
     both = pair_freedoms(model)
     rows = most_rows(model)
-    stages = max(STAGES) if is_spatial(model) else 0
-    # where in it each piece ends
-    turned = model.home.shape[0] * attitude(model)
+    of_pair = pose_size(model) + sums_size(model) + 3 * both * both
+    of_joint = (2 + 4 * both) * rows + both * both + 4 * joint_places(model)
+    of_body = attitude(model) + 2 * shift_size(model)
+    room = np.zeros(
+        model.pair.shape[0] * of_pair
+        + model.joint.shape[0] * of_joint
+        + model.home.shape[0] * of_body
+        + n * (2 + load_slopes(model) + _kept_stages(model))
+        + 4 * joint_places(model)
+        + model.size[3]
+        + model.unknown_index.shape[0]
+    )
+    inverse = inverse_masses(model)
+    solved = model.size[0]
+    for d in range(n):
+        solved += model.free[d]
+    workspace = _carve_workspace(
+        model, room, np.empty((solved, 3 * model.size[1] + 1)), np.zeros(solved, np.int64), _scales(model), inverse,
+        spread_masses(model, inverse), np.ones((2, model.size[0])), movers(model), carriers(model), switches_of(model),
+    )  # fmt: skip
+    shift_tangents(model, model.q0, model.q0, workspace.tangents[NO_SHIFT])
+    return workspace
+
+
+@part
+def _kept_stages(model):
+    """Of how many stages of a step `Workspace.slopes` are."""
+    return max(STAGES) if is_spatial(model) else 0
+
+
+@kernel
+def _carve_workspace(model, room, band, pivots, scale, inverse, spread, diagonal, moves, carries, switches):
+    """A `Workspace` whose other arrays lie behind each other in `room`. They are not counted here, as room is given:
+    where it is made that would be most of the code, all of which is run once a call.
+
+    model: the compiled scene. room: zeros.
+    band, pivots, scale, inverse, spread, diagonal, moves, carries, switches: the workspace's other fields.
+    """
+    n = model.mass.shape[0]
+    bodies = model.home.shape[0]
+    n_pair = model.pair.shape[0]
+    n_joint = model.joint.shape[0]
+    both = pair_freedoms(model)
+    rows = most_rows(model)
+    turned = bodies * attitude(model)
     rel = turned + n_pair * pose_size(model)
     sums = rel + n_pair * sums_size(model)
     f = sums + n
@@ -128,17 +167,10 @@ def make_workspace(model):
     stiffness = pull + n_joint * both * both
     own = stiffness + (n_joint + 1) * 4 * joint_places(model)
     gram = own + model.size[3]
-    x = gram + total
-    slopes = x + stages * n
-    room = np.zeros(slopes + 2 * n // freedoms(model) * shift_size(model))
-    tangents = room[slopes:].reshape((2, n // freedoms(model), shift_size(model)))
-    shift_tangents(model, model.q0, model.q0, tangents[NO_SHIFT])
-    inverse = inverse_masses(model)
-    solved = model.size[0]
-    for d in range(n):
-        solved += model.free[d]
+    x = gram + model.unknown_index.shape[0]
+    slopes = x + _kept_stages(model) * n
     return Workspace(
-        room[:turned].reshape((model.home.shape[0], attitude(model))),
+        room[:turned].reshape((bodies, attitude(model))),
         room[turned:rel].reshape((n_pair, pose_size(model))),
         room[rel:sums].reshape((n_pair, sums_size(model))),
         room[sums:f],
@@ -151,23 +183,23 @@ def make_workspace(model):
         room[phi:gamma].reshape((n_joint, rows)),
         room[jac:by_q].reshape((n_joint, rows, both)),
         room[by_q:by_v].reshape((n_joint, rows, both)),
-        np.empty((solved, 3 * model.size[1] + 1)),
-        np.zeros(solved, np.int64),
+        band,
+        pivots,
         room[gram:x],
-        _scales(model),
+        scale,
         inverse,
-        spread_masses(model, inverse),
+        spread,
         room[by_v:pull].reshape((n_joint, rows, both)),
         room[own:gram],
-        np.ones((2, model.size[0])),
+        diagonal,
         room[stiffness:own].reshape((n_joint + 1, 4, joint_places(model))),
         room[pull:stiffness].reshape((n_joint, both, both)),
         room[turn:known],
-        movers(model),
-        carriers(model),
-        switches_of(model),
-        room[x:slopes].reshape((stages, n)),
-        tangents,
+        moves,
+        carries,
+        switches,
+        room[x:slopes].reshape((_kept_stages(model), n)),
+        room[slopes:].reshape((2, bodies, shift_size(model))),
     )
 
 

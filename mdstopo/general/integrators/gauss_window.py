@@ -96,25 +96,59 @@ def moving(model):
 
 @kernel
 def make_nodes(model):
-    """Arrays for the nodes of a window."""
+    """Arrays for the nodes of a window, in two pieces: rows of whole vectors, and all else."""
     n = model.mass.shape[0]
+    n_pair = model.pair.shape[0]
+    m = moving(model)
+    size = m if m <= DENSE else 0
+    rows = make_rows(10 * MOST + 3 + 2 * (MOST + 1) * size, m)
+    of_node = model.q0.shape[0] + 2 * n + n_pair * (pose_size(model) + sums_size(model))
+    of_node += model.home.shape[0] * window_size(model) + 1
+    return _carve_nodes(model, rows, np.zeros(MOST * of_node + 6 * n + model.size[0] + n_pair))
+
+
+@kernel
+def _carve_nodes(model, rows, room):
+    """The `Nodes` whose arrays lie behind each other in two. They are not counted here, as these are given: where they
+    are made that would be most of the code, all of which is run once a call.
+
+    model: the compiled scene. rows (10 MOST + 3 + 2 (MOST + 1) M, W), room: zeros.
+    """
+    n = model.mass.shape[0]
+    n_pair = model.pair.shape[0]
     m = moving(model)
     width = row_width(m)
-    each = make_rows(10 * MOST, m).reshape((10, MOST, width))
-    vectors = make_rows(np.int64(3), m)
     size = m if m <= DENSE else 0
-    dense = make_rows(2 * MOST * size, m).reshape((2, MOST, size, width))
-    inverse = np.zeros(n)
+    # where in `rows` the next part begins
+    vectors = 10 * MOST
+    by_x = vectors + 3
+    by_y = by_x + MOST * size
+    by_q = by_y + MOST * size
+    by_v = by_q + size
+    # where in `room` each part ends
+    q = MOST * model.q0.shape[0]
+    v = q + MOST * n
+    a = v + MOST * n
+    rel = a + MOST * n_pair * pose_size(model)
+    maps = rel + MOST * model.home.shape[0] * window_size(model)
+    change = maps + 5 * n
+    row = change + model.size[0]
+    inverse = row + n
+    reached = inverse + n_pair
+    when = reached + MOST
+    each = rows[:vectors].reshape((10, MOST, width))
     for d in range(m):
-        inverse[d] = 1.0 / model.mass[d]
-    n_pair = model.pair.shape[0]
+        room[row + d] = 1.0 / model.mass[d]
     return Nodes(
-        each[0], each[1], each[2], each[3], each[4], each[5], each[6], each[7], each[8], each[9], vectors[0],
-        vectors[1], vectors[2], dense[0], dense[1], np.zeros((MOST, model.q0.shape[0])), np.zeros((MOST, n)),
-        np.zeros((MOST, n)), np.zeros((MOST, n_pair, pose_size(model))),
-        np.zeros((MOST, model.home.shape[0], window_size(model))), np.zeros((size, width)), np.zeros((size, width)),
-        np.zeros((5, n)), np.zeros(model.size[0]), inverse, np.zeros(n_pair), np.empty(MOST),
-        np.zeros((MOST, n_pair, sums_size(model))),  # those of pairs without members stay so
+        each[0], each[1], each[2], each[3], each[4], each[5], each[6], each[7], each[8], each[9], rows[vectors],
+        rows[vectors + 1], rows[vectors + 2], rows[by_x:by_y].reshape((MOST, size, width)),
+        rows[by_y:by_q].reshape((MOST, size, width)), room[:q].reshape((MOST, model.q0.shape[0])),
+        room[q:v].reshape((MOST, n)), room[v:a].reshape((MOST, n)),
+        room[a:rel].reshape((MOST, n_pair, pose_size(model))),
+        room[rel:maps].reshape((MOST, model.home.shape[0], window_size(model))), rows[by_q:by_v], rows[by_v:],
+        room[maps:change].reshape((5, n)), room[change:row], room[row:inverse], room[inverse:reached],
+        room[reached:when],
+        room[when:].reshape((MOST, n_pair, sums_size(model))),  # those of pairs without members stay zero
     )  # fmt: skip
 
 

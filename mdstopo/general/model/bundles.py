@@ -24,7 +24,8 @@ def bundle(maker: type, fields: tuple[str, ...]) -> None:
         from numba import types
         from numba.experimental import structref
 
-        import_module(PLACE)  # a type is kept by its name only where the module that has it is loaded, else it is copied
+        # a type is kept by its name only where the module that has it is loaded; else a copy of it is
+        import_module(PLACE)
 
         def preprocess_fields(self: Any, given: Any) -> Any:
             """Literal types would make every literal another structure."""

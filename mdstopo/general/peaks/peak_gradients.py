@@ -1,6 +1,7 @@
-"""Peaks of one response and their gradients in one call, which is all that most evaluations need.
+"""Peaks of one response, or its value at the end, and their gradients in one call: all that most evaluations need.
 
-It is `peak_search.peaks_of_steps` and then `row_sweep.rows_vjp` of the rows that were found.
+It is `peak_search.peaks_of_steps`, or `dense_output.sample_response` at the end, and then `row_sweep.rows_vjp` of the
+rows that were found.
 """
 
 import numpy as np
@@ -8,19 +9,20 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.dynamics.members import unscale_general
 from mdstopo.general.model.general_model import unpack_general
-from mdstopo.general.peaks.dense_output import finished
-from mdstopo.general.peaks.peak_search import highest
+from mdstopo.general.peaks.dense_output import evaluate_here, finished, go_to
+from mdstopo.general.peaks.peak_search import DG, MEMBER, G, add_row, highest
 from mdstopo.general.responses.extremes import COLUMNS, FRACTION, NOBODY, OTHER, SIGN, STEP
 from mdstopo.general.sensitivity.row_sweep import rows_gradients
 from mdstopo.general.steps.step_history import carve_history
+from mdstopo.integrators.steps import OF_SAMPLES
 
 
 @entry
 def peaks_vjp(
-    tag, ints, floats, tables, alpha, limits, count, j, both, fine, closeness, room, room_ints, member_state, padded,
-    out, gradients, work,
+    tag, ints, floats, tables, alpha, limits, count, j, both, at_end, fine, closeness, room, room_ints, member_state,
+    padded, out, gradients, work,
 ):  # fmt: skip
-    """The highest peaks of a response over all steps of a motion, ranked, and their derivatives.
+    """The highest peaks of a response over all steps of a motion, ranked, or its value at the end; and derivatives.
 
     Constant:
       tag: the method of integration (`method_interface`).
@@ -31,6 +33,7 @@ def peaks_vjp(
       alpha (N,): the design.
       count: number of steps.
       j, both, fine, closeness: as of `peak_search.peaks_of_steps`.
+      at_end: whether the value at the end is meant; then the last three are not used.
     In place:
       room, room_ints: flat arrays of the history of steps (`carve_history`); partial steps are kept behind it.
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
@@ -45,7 +48,7 @@ def peaks_vjp(
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
     motion = finished(model, tables, member_state, history, count, work)
-    found = highest(tag, motion, j, both, fine, closeness, out)
+    found = last(tag, motion, j, out) if at_end else highest(tag, motion, j, both, fine, closeness, out)
     if found == 0:
         return found, True
     for r in range(found):
@@ -66,6 +69,21 @@ def peaks_vjp(
         if both:
             gradient *= rows[m, SIGN]
     return found, True
+
+
+@kernel
+def last(tag, motion, j, out):
+    """Write the value of response j at the end of a motion as row 0 of out (1 or more, COLUMNS); returns 1.
+
+    tag: the method of integration (`method_interface`). motion: the motion (`dense_output.Motion`).
+    """
+    k = motion.count - 1
+    sample = np.empty(3)
+    go_to(tag, motion, k, 1.0, np.bool_(True), np.int64(-1))
+    sample[G], sample[DG], sample[MEMBER] = evaluate_here(
+        tag, motion, j, k, 1.0, -1, np.bool_(True), np.bool_(True), OF_SAMPLES
+    )
+    return add_row(out, np.int64(0), motion.history.t, k, 1.0, sample, 1.0)
 
 
 @kernel
