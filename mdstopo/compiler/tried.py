@@ -118,7 +118,9 @@ def give_up(error: Exception, compiled: str = "") -> None:
 def without_private(error: Exception, compiled: str) -> Iterator[None]:
     """Try in Numba's own way what has raised an error in ours; where that goes well, `give_up`.
 
-    compiled: the name of the function that could not be compiled. Raises the error where that goes wrong as well: then what is compiled is wrong, or what it is called with.
+    Raises the error where that goes wrong as well: then what is compiled is wrong, or what it is called with.
+
+    compiled: the name of the function that could not be compiled.
     """
     _raise_if_interrupted(error)
     found = _Way.module
