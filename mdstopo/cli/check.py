@@ -9,6 +9,7 @@ from mdstopo.case.words import count_text
 from mdstopo.cli.options import announce_compilation, case_argument, output_options, set_option
 from mdstopo.cli.output import Output, number
 from mdstopo.cli.uncertain_numbers import say_sample
+from mdstopo.shown import counted
 
 if TYPE_CHECKING:
     from mdstopo.case.errors import CaseError
@@ -186,7 +187,7 @@ def _say_doubts(output: Output, case: "Case", engine: "Evaluator") -> dict[str, 
 def _say_bodies(output: Output, case: "Case") -> None:
     from mdstopo.cli.check_numbers import body_rows
 
-    output.say(f"{len(case.bodies)} bodies")
+    output.say(counted(len(case.bodies), "body"))
     output.table(body_rows(case))
 
 
@@ -197,7 +198,7 @@ def _say_joints(output: Output, case: "Case") -> None:
     for joint in case.joints:
         at = ", ".join(number(value) for value in joint.at_first)
         rows.append([joint.name, joint.type, ", ".join(joint.bodies), f"({at}) on {joint.bodies[0]}"])
-    output.say(f"{len(case.joints)} joints")
+    output.say(counted(len(case.joints), "joint"))
     output.table(rows)
 
 

@@ -3,6 +3,8 @@
 import time
 from typing import TYPE_CHECKING, Any
 
+from mdstopo.shown import counted
+
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
     from mdstopo.engine import Evaluator
@@ -53,7 +55,7 @@ def in_words(found: dict[str, Any] | None) -> str:
         return "not known: kernels that it needs have not been compiled here yet"
     if "message" in found:
         return f"fails at the start: {found['message']}"
-    each = f"{found['steps']:,} steps, {found['force_sums']:,} force sums"
+    each = f"{counted(found['steps'], 'step')}, {counted(found['force_sums'], 'force sum')}"
     if found["points"] > 1:
         each = f"{found['points']} points of {each} or so"
     return f"{each}, {found['milliseconds']:.3g} ms here"

@@ -10,6 +10,7 @@ from mdstopo.cli.fit_numbers import say_fit
 from mdstopo.cli.options import output_options, result_argument
 from mdstopo.cli.output import Output, duration, number
 from mdstopo.cli.uncertain_numbers import say_result
+from mdstopo.shown import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -185,7 +186,7 @@ def _say_sweep(output: Output, view: "ResultView") -> None:
 def _say_trajectories(output: Output, view: "ResultView") -> None:
     for path, t in view.under("trajectories").items():
         if path.endswith("/t") and len(t):
-            output.say(f"motion {path[:-2]}: {len(t) - 1} steps from {number(t[0])} to {number(t[-1])} s")
+            output.say(f"motion {path[:-2]}: {counted(len(t) - 1, 'step')} from {number(t[0])} to {number(t[-1])} s")
 
 
 def _say_sensitivities(output: Output, view: "ResultView") -> None:

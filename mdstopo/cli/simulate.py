@@ -22,6 +22,7 @@ from mdstopo.cli.options import (
     set_option,
 )
 from mdstopo.cli.output import Output, duration, number
+from mdstopo.shown import counted
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, FloatArray
@@ -129,7 +130,9 @@ def _load_cases(case: "Case", names: tuple[str, ...]) -> list[str]:
 
 
 def _say_motion(output: Output, case: "Case", name: str, motion: "Motion") -> None:
-    output.say(f"load case {name}: {len(motion.t) - 1} steps from {number(motion.t[0])} to {number(motion.t[-1])} s")
+    output.say(
+        f"load case {name}: {counted(len(motion.t) - 1, 'step')} from {number(motion.t[0])} to {number(motion.t[-1])} s"
+    )
     rows = [["body", "x, m", "y, m", "angle, rad", "vx, m/s", "vy, m/s", "rate, rad/s"]]
     if case.dimension > 2:
         rows = [["body", *(f"{axis}, m" for axis in "xyz"), *(f"v{axis}, m/s" for axis in "xyz")]]

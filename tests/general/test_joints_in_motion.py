@@ -107,6 +107,20 @@ joints: [{name: pin, type: revolute, bodies: [bob, ground], at: {bob: [0, 0.01],
     assert np.abs(np.array([x, y]) + arm).max() <= 1e-14
 
 
+def test_a_motion_that_a_joint_does_not_allow_is_named_where_assembling_does_not_help():
+    text = """
+format: 1
+time: {end: 1}
+bodies: {slider: {mass: 1, inertia: 0.1, position: [0, 0]}}
+joints: [{name: pin, type: revolute, bodies: [slider, ground], at: [0.3, 0]}]
+"""
+    with pytest.raises(mdstopo.CaseError, match=r"tear joint pin.*no start fits it while slider moves as prescribed"):
+        mdstopo.simulate(read_case(text + "motions: [{body: slider, x: {velocity: 0.2}}]\n"))
+    moving = text.replace("position: [0, 0]", "position: [0, 0], velocity: [0.2, 0]")
+    with pytest.raises(mdstopo.CaseError, match=r"tear joint pin.*assemble: true"):
+        mdstopo.simulate(read_case(moving))
+
+
 def chain(n):
     bodies = "\n".join(f"  b{i}: {{mass: 1, inertia: 0.01, position: [{i + 0.5}, 0]}}" for i in range(n))
     joints = "\n".join(

@@ -9,7 +9,7 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.memory import most_floats, room_factor
-from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.case.model import GROUND, Case, Joint, MemberGroup
 from mdstopo.case.over_time import ReductionKind
 from mdstopo.case.responses import kind_of
 from mdstopo.case.sensitivities import SENSITIVITIES
@@ -253,14 +253,28 @@ class GeneralDriver:
 
     def _fit(self) -> None:
         """Refuse joints that do not fit at the start, or move the start where the case asks for it (CaseError)."""
-        model = self.scene.model
-        if not len(model.joint):
+        if not len(self.scene.model.joint):
             return
+        move = self.case.solver.assemble
+        q, v, mistakes = self._fitted(move)
+        if mistakes:
+            hint = self._remedy([joint for joint, _ in mistakes])
+            raise CaseError(
+                [self.case.marks.mistake(f"joints[{joint.index}]", text + hint) for joint, text in mistakes],
+                str(self.case.path or self.case.name),
+            )
+        self.moved = float(np.abs(self.scene.kinematics.difference(q, self.scene.model.q0)).max())
+        if move:
+            self._start = q, v
+            self._place()
+
+    def _fitted(self, move: bool) -> tuple[FloatArray, FloatArray, list[tuple[Joint, str]]]:
+        """The start (q, v), moved to the nearest that fits if asked for, and which joints do not fit there, and how."""
         from mdstopo.general.statics.start_entry import assemble
 
+        model = self.scene.model
         q, v = model.q0.copy(), model.v0.copy()
         phi, rates = np.zeros((2, *model.row.shape))
-        move = self.case.solver.assemble
         assemble(self.ints, self.floats, q, v, move, phi, rates)
         size = size_of(self.case)
         span = self.scene.load_case.end - self.scene.load_case.start
@@ -275,16 +289,15 @@ class GeneralDriver:
                 mistakes.append(
                     (joint, f"the start velocities tear {describe(joint)} apart at {rate:.3g} (m/s or rad/s)")
                 )
-        if mistakes:
-            hint = "" if move else "; `solver: {assemble: true}` moves the start to the nearest that fits"
-            raise CaseError(
-                [self.case.marks.mistake(f"joints[{joint.index}]", text + hint) for joint, text in mistakes],
-                str(self.case.path or self.case.name),
-            )
-        self.moved = float(np.abs(self.scene.kinematics.difference(q, model.q0)).max())
-        if move:
-            self._start = q, v
-            self._place()
+        return q, v, mistakes
+
+    def _remedy(self, joints: list[Joint]) -> str:
+        """What helps where these joints do not fit at the start, or what is in the way."""
+        if not self.case.solver.assemble and not self._fitted(move=True)[2]:
+            return "; `solver: {assemble: true}` moves the start to the nearest that fits"
+        held = {name for joint in joints for name in joint.bodies}
+        driven = [motion.body for motion in self.scene.load_case.motions if motion.body in held]
+        return f"; no start fits it while {' and '.join(driven)} moves as prescribed" if driven else ""
 
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate alpha (N,) and evaluate all responses; `self.work` holds the counts of this call."""
