@@ -170,11 +170,12 @@ def _note_zero(count: int, first_zero: tuple[int, int], first: _End, path: str, 
 
 def _note_empty(first: _End, second: _End, path: str, reading: Reading) -> None:
     """The mistake that no member is within the stated lengths, with the distances that there are."""
-    apart = [np.linalg.norm(second.world - point, axis=1) for point in first.world]
-    least, most = min(float(row.min()) for row in apart), max(float(row.max()) for row in apart)
+    least, most = math.inf, 0.0
+    for point in first.world:  # one by one: all distances at once may be too many for the memory
+        apart = np.linalg.norm(second.world - point, axis=1)
+        least, most = min(least, float(apart.min())), max(most, float(apart.max()))
     reading.mistake(
-        path,
-        f"min_length and max_length leave no member; the points are {least:.4g} to {most:.4g} m apart",
+        path, f"min_length and max_length leave no member; the points are {least:.4g} to {most:.4g} m apart"
     )
 
 

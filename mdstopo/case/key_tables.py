@@ -60,6 +60,28 @@ def keys_of(section: str, case: Record = FORMAT) -> str:
     return "\n\n".join(_told(each, anchors) for each in known[section])
 
 
+def lines_of(section: str, case: Record = FORMAT) -> list[str]:
+    """The mappings below one key of a case as lines for a terminal; "" for the case itself."""
+    lines: list[str] = []
+    for place in places(case)[section]:
+        record = place.record
+        lines += ["", f"{place.path}: {record.what}" if place.path else "the case itself"]
+        about = [_cell(record.doc)] if place.path else []
+        lines += [f"  {_unmarked(text)}" for text in (*about, *_rules(record)) if text]
+        for key in record.keys:
+            unit = f", {key.unit}" if key.unit else ""
+            default = "required" if key.required else f"default {_unmarked(_default(key))}"
+            lines.append(f"  {key.name}: {_unmarked(_value(key.kind, {}, ''))}{unit}; {default}")
+            lines += [f"      {_unmarked(part)}" for part in _meaning(key).split("<br>")]
+    return lines[1:]
+
+
+def _unmarked(cell: str) -> str:
+    """A cell of a table without the marks of Markdown."""
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", cell).replace("`", "").replace("\\", "")
+    return html.unescape(text)
+
+
 def _below(kind: Kind, path: str, depth: int, seen: set[int]) -> Iterator[Place]:
     """The mappings that a value of this kind holds, outer ones first."""
     if isinstance(kind, Record):
@@ -86,28 +108,6 @@ def _parts(kind: Kind) -> list[Kind]:
     if isinstance(kind, ByShape):
         return [part for part in (kind.scalar, kind.sequence, kind.mapping) if part is not None]
     return []
-
-
-def lines_of(section: str, case: Record = FORMAT) -> list[str]:
-    """The same as plain lines, for a terminal."""
-    known = places(case)
-    lines = []
-    for place in known[section]:
-        title = place.path or "the case itself"
-        lines += ["", f"{title}: {place.record.what}" if place.path else title]
-        lines += [f"  {_unmarked(text)}" for text in (*_rules(place.record),) if text]
-        for key in place.record.keys:
-            unit = f", {key.unit}" if key.unit else ""
-            default = "required" if key.required else f"default {_unmarked(_default(key))}"
-            lines.append(f"  {key.name}: {_unmarked(_value(key.kind, {}, ''))}{unit}; {default}")
-            lines += [f"      {_unmarked(part)}" for part in _meaning(key).split("<br>")]
-    return lines[1:]
-
-
-def _unmarked(cell: str) -> str:
-    """A cell of a table without the marks of Markdown."""
-    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", cell).replace("`", "").replace("\\", "")
-    return html.unescape(text)
 
 
 def _told(place: Place, anchors: dict[int, str]) -> str:

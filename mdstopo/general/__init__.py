@@ -10,8 +10,8 @@ Its folders, from what Python calls down to the arrays; imports point downwards 
     scene         from a case to arrays           integrators   steps through time, and these linearised
     pricing       candidates that are not built   events        members that switch
     statics       before a run begins             design        derivatives by alpha and by values of laws
-    peaks         between steps                   responses     numbers of a state
-                                                  steps         what every method of integration has
+    structures    their types, by name            responses     numbers of a state
+    peaks         responses between steps         steps         what every method of integration has
                                                   dynamics      forces, equations of motion, joints
                                                   model         a scene as arrays
 """

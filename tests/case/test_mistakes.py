@@ -56,7 +56,7 @@ ONE = [
     ("from: p, ", "", "{to", "members.belts", ["'from'", "missing"]),
     ("to: q", "to: q, connect: pairs", "pairs", "members.belts.connect", ["2 points", "3", "equal"]),
     ("to: q", "to: q, connect: pair", "pair,", "members.belts.connect", ["'pair'", "'pairs'", "all"]),
-    ("to: q", "to: q, max_length: 1", "{from", "members.belts", ["no member", "m apart"]),
+    ("to: q", "to: q, max_length: 1", "{from", "members.belts", ["no member", "2 to 2.828 m apart"]),
     ("to: q", "to: q, min_length: 3, max_length: 1", "1,", "members.belts.max_length", ["min_length 3"]),
     ("to: q", "to: q, cost: -1", "-1", "members.belts.cost", ["-1", ">= 0"]),
     ("to: q", "to: q, cost: lenght", "lenght", "members.belts.cost", ["'lenght'", "'length'", "number"]),

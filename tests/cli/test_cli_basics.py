@@ -129,12 +129,18 @@ def test_every_key_of_a_section_is_told_in_plain_words(
         told = capsys.readouterr().out
         for place in part:
             assert all(f"\n  {key.name}: " in told for key in place.record.keys), place.path
+            assert not place.path or place.record.doc.replace("`", "")[:25] in told, place.path
         assert not re.search(r"<br>|&[gl]t;|`|\]\(", told), section
 
 
 def test_a_section_that_there_is_not_is_told_with_those_that_there_are(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_group(["schema", "objectivs"]) == 2
     assert "no section 'objectivs'; there are case, time, bodies, " in capsys.readouterr().err
+
+
+def test_keys_in_space_are_asked_for_with_a_section(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_group(["schema", "--space"]) == 2
+    assert "--space goes with a SECTION" in capsys.readouterr().err
 
 
 def test_a_reader_that_leaves_early_is_no_error() -> None:

@@ -24,7 +24,7 @@ def _solve_iteratively(ints, floats, h, x, y, jac):
 
 
 @pytest.mark.parametrize(("size", "settles"), [(0.0, True), (1e-6, True), (1e-3, True), (1e2, False)])
-def test_sweeps_solve_with_small_multipliers_and_say_where_they_do_not(size, settles):
+def test_iterations_solve_with_small_multipliers_and_say_where_they_do_not(size, settles):
     model = model_of(MECHANISM.replace("LAW", "{type: spring, stiffness: 1}"))
     rng = np.random.default_rng(3)
     n, n_row = len(model.mass), int(model.size[0])

@@ -434,8 +434,11 @@ class GeneralDriver:
 
     @cached_property
     def _plain_rows(self) -> bool:
-        """Whether there is one response, of which peaks or the end are meant, and derivatives are sweeps of their
-        own."""
+        """Whether one compiled call (`peaks_vjp`) finds the rows of an evaluation with their gradients.
+
+        There is one response, not of competing members, of which the largest value, the largest magnitude or the end is
+        meant; peaks are those of the response itself, without switches; and the motion starts as stated.
+        """
         if len(self.scene.reductions) != 1 or self.start is not None:
             return False
         (reduction,), model = self.scene.reductions, self.scene.model

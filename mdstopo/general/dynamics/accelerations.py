@@ -137,8 +137,10 @@ def _kept_stages(model):
 
 @kernel
 def _carve_workspace(model, room, band, pivots, scale, inverse, spread, diagonal, moves, carries, switches):
-    """A `Workspace` whose other arrays lie behind each other in `room`. They are not counted here, as room is given:
-    where it is made that would be most of the code, all of which is run once a call.
+    """A `Workspace` whose other arrays lie behind each other in `room`.
+
+    It is a function of its own because of compile time: no references are counted of arrays that are cut out of one
+    that is given. Where the array is made, counting them would be most of the code.
 
     model: the compiled scene. room: zeros.
     band, pivots, scale, inverse, spread, diagonal, moves, carries, switches: the workspace's other fields.

@@ -109,8 +109,10 @@ def make_nodes(model):
 
 @kernel
 def _carve_nodes(model, rows, room):
-    """The `Nodes` whose arrays lie behind each other in two. They are not counted here, as these are given: where they
-    are made that would be most of the code, all of which is run once a call.
+    """The `Nodes`, whose arrays lie behind each other in two pieces.
+
+    It is a function of its own because of compile time: no references are counted of arrays that are cut out of ones
+    that are given. Where these are made, counting them would be most of the code.
 
     model: the compiled scene. rows (10 MOST + 3 + 2 (MOST + 1) M, W), room: zeros.
     """

@@ -1,1 +1,1 @@
-"""Peaks of responses on the method's own motion between steps, and their gradients."""
+"""States and responses anywhere on the method's own motion; peaks of responses, and their gradients."""

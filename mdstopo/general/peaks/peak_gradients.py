@@ -1,7 +1,7 @@
 """Peaks of one response, or its value at the end, and their gradients in one call: all that most evaluations need.
 
-It is `peak_search.peaks_of_steps`, or `dense_output.sample_response` at the end, and then `row_sweep.rows_vjp` of the
-rows that were found.
+It does what `peak_search.peaks_of_steps`, or `dense_output.sample_response` at the end, and then `row_sweep.rows_vjp`
+of the rows that were found do.
 """
 
 import numpy as np
@@ -48,7 +48,7 @@ def peaks_vjp(
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
     motion = finished(model, tables, member_state, history, count, work)
-    found = last(tag, motion, j, out) if at_end else highest(tag, motion, j, both, fine, closeness, out)
+    found = _value_at_end(tag, motion, j, out) if at_end else highest(tag, motion, j, both, fine, closeness, out)
     if found == 0:
         return found, True
     for r in range(found):
@@ -72,10 +72,11 @@ def peaks_vjp(
 
 
 @kernel
-def last(tag, motion, j, out):
+def _value_at_end(tag, motion, j, out):
     """Write the value of response j at the end of a motion as row 0 of out (1 or more, COLUMNS); returns 1.
 
-    tag: the method of integration (`method_interface`). motion: the motion (`dense_output.Motion`).
+    tag: the method of integration (`method_interface`).
+    motion: the motion (`dense_output.Motion`).
     """
     k = motion.count - 1
     sample = np.empty(3)

@@ -1,1 +1,1 @@
-"""Values of responses at an instant, their slopes, and the rows that peaks are."""
+"""Values of responses at an instant, and their slopes; the rows that peaks are noted in; zeros of sampled functions."""

@@ -327,23 +327,9 @@ def _step_of(row):
 
 @kernel
 def add_row(
-    tag,
-    model,
-    tables,
-    member_state,
-    history,
-    count,
-    own,
-    row,
-    iterations,
-    found,
-    workspace,
-    step,
-    states,
-    sets,
-    out,
+    tag, model, tables, member_state, history, count, own, row, iterations, found, workspace, step, states, sets, out,
     work,
-):
+):  # fmt: skip
     """Differentiate one row, with the derivatives of the state at the start of the step that it is read in.
 
     Constant:
