@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import mdstopo
 from mdstopo.case import candidates
 from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
@@ -267,6 +268,25 @@ def test_prices_know_members_that_begin_to_act_at_the_very_instant_of_a_peak():
     (states,) = scene.states.scenes
     assert 0.1 in states.when[states.steps.step[states.steps.step[:, KIND] == POINT, FIRST_STAGE]]
     assert scene.error <= 1e-8
+
+
+def test_time_goes_on_where_a_member_switches_right_behind_another():
+    """The response was not a number in the step without length that ended at the second switch."""
+    law = {"type": "crush", "stiffness": 900, "force": 40, "side": "tension", "free_length": 0.3, "active_from": 0.1}
+    solver = {"step": STEP, "integrator": "runge_kutta"}
+    case = read_case(json.dumps({"format": 1, **arm(law, **looked(PUSH, "max")), "solver": solver}))
+    whole = with_members(case, {"web": np.divmod(np.arange(80), 21)})
+    alpha = np.full(whole.n_design, 0.4)
+    motion = mdstopo.simulate(whole, alpha)
+    assert np.diff(motion.t).min() > 0.0
+    at = np.array([0.0, -0.1])  # of the point, from the middle of the foot, as drawn
+    turn = motion.q[:, 5] - 0.2
+    c, s, w, b = np.cos(turn), np.sin(turn), motion.v[:, 5], motion.a[:, 5]
+    arm_x, arm_y = c * at[0] - s * at[1], s * at[0] + c * at[1]
+    size = np.hypot(motion.a[:, 3] - b * arm_y - w**2 * arm_x, motion.a[:, 4] + b * arm_x - w**2 * arm_y)
+    found = mdstopo.evaluate(whole, alpha, gradient=False).objectives["G"]
+    assert found >= size.max() * (1.0 - 1e-9)
+    assert found <= 1.5 * size.max()
 
 
 def test_the_price_of_mirror_images_is_the_sum_of_theirs():

@@ -311,6 +311,9 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
     value, _ = margin_inside(step, segment, t, h, beside, step.single, no, step.at_q, step.at_v)
     rate = (at_high - value) / ((c - beside) * h) if c > beside else 0.0
     value, who = margin_inside(step, segment, t, h, c, crossed, np.bool_(True), step.at_q, step.at_v)
-    if not jointed:
-        return c, who, rate
-    return on_joints(step, segment, t, h, begin, c, value, who, rate, rounding, resolution)
+    if jointed:
+        c, who, rate = on_joints(step, segment, t, h, begin, c, value, who, rate, rounding, resolution)
+    if c < resolution:  # time would stand still, and a step without length has no slopes
+        c = resolution
+        _, who = margin_inside(step, segment, t, h, c, crossed, np.bool_(True), step.at_q, step.at_v)
+    return c, who, rate

@@ -201,7 +201,7 @@ def advance_to_switch(
         before = length
         at_before = value
         shift = -(value + AIM * rounding) / rate if rate < 0.0 else 4e-16 * (abs(t) + h) * 4.0**tries
-        length = min(max(length + shift, 0.5 * length), h)
+        length = min(max(length + shift, 0.5 * length, 4e-16 * (abs(t) + h)), h)
     return length, value < -rounding, singular
 
 
