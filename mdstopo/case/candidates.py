@@ -14,12 +14,14 @@ from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.case.aims import VolumeRow
 from mdstopo.case.arrays import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, MemberGroup
+    from mdstopo.case.parts import Candidates
 
 ROUNDING = 1e-12
 """Lengths are compared up to this share of the coordinates they come from: 0.3 includes 0.1 + 0.2."""
@@ -154,6 +156,27 @@ def _built(group: MemberGroup, i: IndexArray, j: IndexArray) -> MemberGroup:
     )
 
 
+def some_candidates(own: Candidates, first: FloatArray, second: FloatArray, count: int) -> Pairs:
+    """Candidates between evenly spread points of two grids (n, d), of about `count` pairs of these.
+
+    Where limits on lengths leave none of the pairs, more points of the grids are taken, until there are some or
+    MOST_STARTED pairs have been looked at.
+    """
+    while True:
+        p, q = spread(len(first), len(second), count)
+        i, j = np.repeat(p, len(q)), np.tile(q, len(p))
+        there = are_there(own, lengths_between(first[i], second[j]))
+        if there.any() or len(i) >= min(own.count, MOST_STARTED):
+            return i[there], j[there]
+        count *= 4
+
+
+def are_there(own: Candidates, length: FloatArray) -> NDArray[np.bool_]:
+    """Which pairs of points at these distances are candidates: not of no length, and within the limits."""
+    there: NDArray[np.bool_] = (length >= own.shortest) & (length <= own.longest) & (length > 0.0)
+    return there
+
+
 def with_start_set(case: Case) -> Case:
     """The case with a coarse subset of the candidates of its priced groups, enough of them for its volume rows."""
     count = START_SET
@@ -185,13 +208,6 @@ def spread(n_p: int, n_q: int, count: int | None) -> tuple[IndexArray, IndexArra
 
 
 def _coarse(group: MemberGroup, count: int) -> Pairs:
-    """About so many candidates of every part of both grids, or all of fewer; more grids' points where few may be."""
+    """About so many candidates of every part of both grids, or all of fewer."""
     assert group.candidates is not None
-    while True:
-        p, q = spread(len(group.from_world), len(group.to_world), count)
-        i, j = np.repeat(p, len(q)), np.tile(q, len(p))
-        length = lengths_between(group.from_world[i], group.to_world[j])
-        keep = (length >= group.candidates.shortest) & (length <= group.candidates.longest) & (length > 0.0)
-        if keep.any() or len(i) >= min(group.candidates.count, MOST_STARTED):
-            return i[keep], j[keep]
-        count *= 4
+    return some_candidates(group.candidates, group.from_world, group.to_world, count)

@@ -48,7 +48,7 @@ class FitRun:
     starts: those that are done. trace: all evaluations of the starts. latest: the last of them. found, statistics: the
     best, and its statistics; None where none has a motion, or before all starts are done. profiles: by the name of the
     estimate. status: running | converged | max_iterations | failed | interrupted; reason: in words. simulations:
-    motions that were computed.
+    motions that were computed. concluded: whether these include the one at the minimum, from a run of before.
     """
 
     problem: FitProblem
@@ -61,6 +61,7 @@ class FitRun:
     status: str = "running"
     reason: str = ""
     simulations: int = 0
+    concluded: bool = False
 
     @property
     def shown(self) -> Evaluated | None:
@@ -114,11 +115,15 @@ def run_fit(
         passing(run)
 
     try:
-        for begin in starts(problem)[len(run.starts) :]:
+        left = starts(problem)[len(run.starts) :]
+        for begin in left:
             end = fitted(problem, begin, stop, seen)
             run.starts.append(Start(begin, end.x, end.deviation, end.level, end.status, end.reason, end.evaluations))
             keep()
+        before_end = problem.simulations
         _conclude(run)
+        if run.concluded and not left:  # the same again, which has been counted
+            earlier -= problem.simulations - before_end
         keep()
         for name in _unprofiled(run, points) if points else ():
             _profile(run, name, points, stop)
@@ -163,7 +168,8 @@ def _unprofiled(run: FitRun, points: int) -> list[str]:
 
 def restored(problem: FitProblem, content: Mapping[str, Any]) -> FitRun:
     """What a run that was stopped had done, from what `fit_record.content` made of it."""
-    run = FitRun(problem, simulations=int(content["simulations"] or 0))
+    concluded = content["freedom"] is not None
+    run = FitRun(problem, simulations=int(content["simulations"] or 0), concluded=concluded)
     for each in content["starts"]:
         level = float("inf") if each["level"] is None else float(each["level"])
         deviation = _deviations(problem, each["deviation"])

@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.candidates import lengths_between, spread
+from mdstopo.case.candidates import are_there, lengths_between, some_candidates, spread
 from mdstopo.case.model import MemberGroup
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.sensitivity.springs_candidate_prices import (
@@ -152,10 +152,7 @@ class CandidatePass(ABC, Generic[A]):
         error = self.error(states)
         if error == 0.0:
             return 0.0
-        places = spread(len(self.homes[0]), len(self.homes[1]), SAMPLE)
-        a, b = (each.ravel() for each in np.meshgrid(*places, indexing="ij"))
-        _, there = self._lengths(a, b)
-        sample = self.prices_between(states, a[there], b[there])
+        sample = self.prices_between(states, *some_candidates(self.candidates, self.homes[0], self.homes[1], SAMPLE))
         return float(max(error * np.abs(sample).max(initial=0.0), np.finfo(float).tiny))
 
     def grids(self, states: A) -> Sequence[tuple[FloatArray, FloatArray]]:
@@ -173,8 +170,7 @@ class CandidatePass(ABC, Generic[A]):
     def _lengths(self, a: IndexArray, b: IndexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """The lengths (K,) of candidates from first points to second ones (m), and whether there are such."""
         length = lengths_between(self.homes[0][a], self.homes[1][b])
-        own = self.candidates
-        return length, (length >= own.shortest) & (length <= own.longest) & (length > 0.0)
+        return length, are_there(self.candidates, length)
 
     @property
     def shape(self) -> tuple[int, int]:

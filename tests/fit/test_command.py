@@ -130,6 +130,9 @@ def test_a_run_that_is_stopped_goes_on(
     assert [each["x"] for each in again["starts"]] == [each["x"] for each in whole["starts"]]
     for key in ("estimates", "series", "correlation", "evaluations"):
         assert again[key] == whole[key]
+    # of one that is finished, nothing is computed that was not
+    assert run_group(["fit", "fall.yaml", *many, "--resume"]) == 0
+    assert result(place)["simulations"] == again["simulations"]
     # another fit, and another case, are not gone on with
     assert run_group(["fit", "fall.yaml", "--set", "fit.starts=4", "--resume"]) == 2
     assert "not the same" in capsys.readouterr().err

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from mdstopo.case.candidates import with_members
+from mdstopo.case.candidates import spread, with_members
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
+from mdstopo.sensitivity.candidate_pass import SAMPLE, SMOOTH_ERROR
 from mdstopo.sensitivity.springs_candidate_prices import BEST, COMPUTED, ERROR, SEEN
 from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
 
@@ -172,6 +173,17 @@ def assert_dense_pass_is_right(candidates, states, size, error):
     there = np.isfinite(exact)
     assert np.abs(prices[there] - exact[there]).max() <= 10.0 * error * size
     assert np.abs(few[:, BEST] - all_of_them[:, BEST]).max() <= 10.0 * error * size
+
+
+def test_prices_may_be_off_by_as_little_of_the_largest_where_lengths_leave_few_candidates():
+    """So few that none is among evenly spread pairs; an error of nothing would have every candidate priced."""
+    length = float(np.hypot(0.4 + 0.3, -1.1 - 0.2)) + 0.003
+    few = {"min_length": length - 0.0005, "max_length": length + 0.0005}
+    candidates, (i, j), states, gradient, _, _ = priced(plate(group=few))
+    p, q = spread(33, 150, SAMPLE)
+    assert not (np.isin(i, p) & np.isin(j, q)).any()
+    error = candidates.common(states, 0.0)[ERROR] / (SMOOTH_ERROR * np.abs(gradient).max())
+    assert 0.1 <= error <= 1.01
 
 
 def test_of_many_that_pay_some_of_every_tile_are_told():
