@@ -12,12 +12,12 @@ from mdstopo.case.over_time import REDUCTIONS, ReductionKind
 from mdstopo.case.responses import kind_of
 from mdstopo.compiler.threads import allowed
 from mdstopo.general.model.general_model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel, without_numbers
-from mdstopo.general.model.layout import arrange
 from mdstopo.general.responses import general_responses
-from mdstopo.general.responses.expression_rows import expression_codes, expression_data
 from mdstopo.general.scene.dimension import Dimension, Frames, Pairs, dimension_of, in_frame
 from mdstopo.general.scene.driven_integrals import integration_times
 from mdstopo.general.scene.drives import Drives, drives, drives_all, motion_times
+from mdstopo.general.scene.expression_rows import expression_codes, expression_data
+from mdstopo.general.scene.layout import arrange
 from mdstopo.general.scene.timed_loads import kink_times, mistake_of, parts_of, timed_loads
 from mdstopo.general.scene.variables import (
     adds_damping,

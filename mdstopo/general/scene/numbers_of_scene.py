@@ -15,9 +15,9 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.following import expressions_of
 from mdstopo.case.model import GROUND, Case, LoadCase
 from mdstopo.general.model.general_model import VARIED_COLUMNS, GeneralModel, pack_general
-from mdstopo.general.model.layout import arrange
 from mdstopo.general.scene.dimension import dimension_of
 from mdstopo.general.scene.further_times import landed
+from mdstopo.general.scene.layout import arrange
 from mdstopo.general.scene.moved_ends import WIDTH
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.design_map import BESIDE_SCENE, CasesWith
