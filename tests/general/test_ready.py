@@ -9,6 +9,8 @@ from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
 from mdstopo.general.driver.general_driver import COUNT_AT, TANGENT_AT, WINDOW_AT
 from mdstopo.general.driver.ready import Ready
+from mdstopo.general.responses.extremes import TIME, VALUE
+from mdstopo.status import Status
 from tests.general.test_esdirk import PENDULUM
 
 
@@ -85,3 +87,16 @@ def test_arrays_stay_where_those_that_are_looked_at_stay(evaluator):
     before = run(np.full(2, 0.5), rows=Rows(window=0.5, most=4))
     after = run(np.full(2, 0.75), rows=Rows(window=0.25, most=4, cones=True))
     assert all(a is b for a, b in zip(before, after, strict=True) if isinstance(a, np.ndarray | Ready))
+
+
+def test_a_response_that_is_no_number_is_told(evaluator, monkeypatch):
+    driver = evaluator.driver(next(iter(evaluator.scenes)))
+
+    def lost(*_):
+        driver.found[0] = 1
+        driver.rows[0, 0, [TIME, VALUE]] = 0.25, np.nan
+
+    monkeypatch.setattr(driver, "_reduce_response", lost)
+    outcome = evaluator.evaluate(np.full(2, 0.5), gradient=False)
+    assert outcome.status is Status.NON_FINITE
+    assert "response displacement has no value at t = 0.25 s" in outcome.message

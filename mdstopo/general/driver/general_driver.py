@@ -1,5 +1,6 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -326,24 +327,28 @@ class GeneralDriver:
                     self._reduce_response(j, reduction, count, gradient, window)
             if gradient and not differentiated:
                 self.row_gradients(count, across)
-            if self._expressions:
-                status, message = self._without_value(gradient)
+            status, message = self._without_value(gradient)
         grazing, meeting = self._grazing(), self.where.item(1)
         return ResponseResult(
             status, time, self.rows, self.found, self.gradients, meeting, grazing, across, message=message
         )
 
     def _without_value(self, gradient: bool) -> tuple[Status, str]:
-        """Whether expressions that are responses have values, and gradients where wanted; which has none, and when."""
-        for j in self._expressions:
-            response = self.scene.responses[j]
+        """Whether responses have values, and those that are expressions gradients where wanted; which has none, and
+        when."""
+        for j, response in enumerate(self.scene.responses):
+            # what is no number is the limit that other rows are compared with, so it stands first; not in expressions
+            if not response.of and (not self.found[j] or math.isfinite(self.rows.item(j, 0, VALUE))):
+                continue
             found = self.rows[j, : self.found[j]]
             none = found[~np.isfinite(found[:, VALUE])]
             if len(none):
+                what = f"expression {response.formula}" if response.of else f"response {response.kind}"
                 when = f" at t = {none[0, TIME]:.6g} s" if np.isfinite(none[0, TIME]) else ""
-                return Status.NON_FINITE, f"the expression {response.formula} has no value{when}"
-            if gradient and not np.all(np.isfinite(self.gradients[j, : self.found[j]])):
-                return Status.NO_GRADIENT, f"the expression {response.formula} has an infinite slope"
+                return Status.NON_FINITE, f"the {what} has no value{when}"
+        for j in self._expressions if gradient else ():
+            if not np.all(np.isfinite(self.gradients[j, : self.found[j]])):
+                return Status.NO_GRADIENT, f"the expression {self.scene.responses[j].formula} has an infinite slope"
         return Status.OK, ""
 
     @cached_property
