@@ -18,6 +18,9 @@ def html_of(value: Any) -> str:
 
 def counted(count: int, noun: str) -> str:
     """A number with its noun, in the plural where it is not one: `1 body`, `3 members`."""
-    if count == 1:
-        return f"1 {noun}"
-    return f"{count:,} {noun[:-1]}ies" if noun.endswith("y") else f"{count:,} {noun}s"
+    return f"1 {noun}" if count == 1 else f"{count:,} {plural(noun)}"
+
+
+def plural(noun: str) -> str:
+    """A noun in the plural: `bodies`, `members`."""
+    return f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"

@@ -172,7 +172,7 @@ def _note_empty(first: _End, second: _End, path: str, reading: Reading) -> None:
     """The mistake that no member is within the stated lengths, with the distances that there are."""
     least, most = math.inf, 0.0
     for point in first.world:  # one by one: all distances at once may be too many for the memory
-        apart = np.linalg.norm(second.world - point, axis=1)
+        apart = lengths_between(point, second.world)
         least, most = min(least, float(apart.min())), max(most, float(apart.max()))
     reading.mistake(
         path, f"min_length and max_length leave no member; the points are {least:.4g} to {most:.4g} m apart"

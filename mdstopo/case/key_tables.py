@@ -17,6 +17,7 @@ from mdstopo.case.schema_fit import ColumnOf
 from mdstopo.case.schema_space import SPACE_FORMAT
 from mdstopo.case.schema_uncertainty import Anything, ByKey
 from mdstopo.case.svg_path import SvgPath
+from mdstopo.shown import plural
 
 #: sections of a case in space that have a table on its page
 IN_SPACE = ("bodies", "joints", "motions", "points", "contacts", "loads", "objectives")
@@ -199,7 +200,7 @@ def _value(kind: Kind, anchors: dict[int, str], path: str) -> str:
     if isinstance(kind, Named):
         return f"mapping from names to {_value(kind.item, anchors, path)}"
     if isinstance(kind, ByName):
-        return f"mapping from {_plural(kind.kind)} to {_value(kind.item, anchors, path)}"
+        return f"mapping from {plural(kind.kind)} to {_value(kind.item, anchors, path)}"
     if isinstance(kind, ByKey):
         return f"mapping from {kind.what}: {_value(kind.item, anchors, path)}"
     if isinstance(kind, ByDepth):
@@ -217,7 +218,7 @@ def _several(kind: Vector) -> str:
     if isinstance(item, Vector):
         return f"list of {kind.length}, each a {_several(item)}"
     if isinstance(kind.item, Ref):
-        return f"names of {kind.length} {_plural(kind.item.kind)}"
+        return f"names of {kind.length} {plural(kind.item.kind)}"
     return f"list of {kind.length} {_cell(_simple(kind.item)).replace('number', 'numbers', 1)}"
 
 
@@ -256,10 +257,6 @@ def _simple(kind: Kind) -> str:
         FormulaText: "an [expression](expressions.md)", Parameters: "`{name: number, ...}`",
     }  # fmt: skip
     return texts[type(kind)]
-
-
-def _plural(noun: str) -> str:
-    return f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
 
 
 def _cell(text: str) -> str:

@@ -29,7 +29,8 @@ from mdstopo.cli.uncertain_numbers import document_of, lines_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mdstopo.session.outcome import ChosenSizes, Outcome
+    from mdstopo.shown import counted
+from mdstopo.session.outcome import ChosenSizes, Outcome
 
 _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is neither there nor gone
 
@@ -255,7 +256,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
         largest = f"; the largest alpha is {number(outcome.alpha.max(), 3)}" if not full + grey else ""
         lines.append(("members", f"{full} present, {grey} grey, {gone} absent of {case.n_design}{largest}"))
     if outcome.pricing is not None:
-        rounds = f"{outcome.pricing.rounds} round{'s' if outcome.pricing.rounds != 1 else ''}"
+        rounds = counted(outcome.pricing.rounds, "round")
         best, together = number(outcome.pricing.best, 2), number(outcome.pricing.together, 2)
         gain = f"gain to first order, relative: {best} by the best one, {together} by all at most"
         lines.append(("candidates", f"{count_text(outcome.pricing.candidates)}, {rounds}; {gain}"))

@@ -1671,7 +1671,7 @@ def build(dispatcher: Any, letters: str) -> Code | None:
     Nothing where the code would need more of Numba's run time than is provided.
     """
     arguments = tuple(map(numba_type, letters.split()))
-    with _untold(), _unswept():
+    with _untold(), _uncollected():
         return _built(dispatcher, arguments, letters)
 
 
@@ -1688,7 +1688,7 @@ def _untold() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _unswept() -> Iterator[None]:
+def _uncollected() -> Iterator[None]:
     """Have Python not look for what could go: what the compiler makes lives on, and it takes a tenth of the time."""
     looks = gc.isenabled()
     gc.disable()

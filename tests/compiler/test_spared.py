@@ -128,7 +128,7 @@ def test_cycles_are_looked_for_again_after_a_compilation() -> None:
     looked = []
 
     def fails() -> None:
-        with compiles._unswept():
+        with compiles._uncollected():
             looked.append(gc.isenabled())
             raise ZeroDivisionError
 

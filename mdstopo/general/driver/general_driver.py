@@ -133,7 +133,7 @@ class GeneralDriver:
         #: responses that are expressions, which may have no values
         self._expressions = [j for j, response in enumerate(scene.responses) if response.of]
         self.padded = np.zeros(padded + varied)
-        self._swept = self.padded.reshape(1, -1)
+        self._padded_row = self.padded.reshape(1, -1)
         self.found = np.zeros(count, dtype=np.int64)
         #: how the value of every response is formed: plain, absolute, a norm (`evaluation.Peak.shape`)
         self.shapes: tuple[Shape, ...] = tuple(
@@ -298,7 +298,8 @@ class GeneralDriver:
             return "; `solver: {assemble: true}` moves the start to the nearest that fits"
         held = {name for joint in joints for name in joint.bodies}
         driven = [motion.body for motion in self.scene.load_case.motions if motion.body in held]
-        return f"; no start fits it while {' and '.join(driven)} moves as prescribed" if driven else ""
+        moves = "moves" if len(driven) == 1 else "move"
+        return f"; no start fits it while {' and '.join(driven)} {moves} as prescribed" if driven else ""
 
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate alpha (N,) and evaluate all responses; `self.work` holds the counts of this call."""
@@ -468,7 +469,7 @@ class GeneralDriver:
         (reduction,) = self.scene.reductions
         return (
             *self.steps_arguments(count), 0, reduction.is_magnitude, reduction.at_end, self.steps_are_fine, window,
-            self.room, self.room_ints, self.member_state, self._swept, self._rows_of[0], self._gradients_of[0],
+            self.room, self.room_ints, self.member_state, self._padded_row, self._rows_of[0], self._gradients_of[0],
             self.work,
         )  # fmt: skip
 

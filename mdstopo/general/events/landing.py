@@ -11,7 +11,18 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.events.events import first_sign, smallest_margin
-from mdstopo.general.events.locate import AIM, BESIDE, CUTS, NEAR, TRIALS, cut_at, matters, narrowed, next_trial
+from mdstopo.general.events.locate import (
+    AIM,
+    BESIDE,
+    CUTS,
+    NEAR,
+    RESOLUTION,
+    TRIALS,
+    cut_at,
+    matters,
+    narrowed,
+    next_trial,
+)
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.steps.step_history import copy_vector
 from mdstopo.general.steps.step_inside import state_inside, weigh_inside
@@ -291,7 +302,7 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
         return 2.0, -1, 0.0
     begin = low
     crossed = step.crossed
-    resolution = 4e-16 * (abs(t) + h) / h
+    resolution = RESOLUTION * (abs(t) + h) / h
     jointed = step.model.size[0] > 0
     no = np.bool_(False)
     c = high

@@ -38,6 +38,8 @@ TRIALS = 100
 CUTS = 24
 #: margins (times rounding) at which a place behind the switch is near enough, and which is aimed at
 NEAR, AIM = 50.0, 5.0
+#: times that differ by less than this part of them are one: a step as short would have no length
+RESOLUTION = 4e-16
 #: trials that are foreseen; evaluations of the quintic's margin for its root, and how near that is found; by which
 #: share of the piece its rate is differenced
 FORESEEN, LAPS, CLOSE, BESIDE = 8, 40, 1e-9, 1e-4

@@ -31,7 +31,15 @@ from mdstopo.general.events.events import (
     watch_near,
 )
 from mdstopo.general.events.landing import CORRECTIONS, first_event, landing_of
-from mdstopo.general.events.locate import AIM, NEAREST, is_sharp, step_beside_sharp, time_to_sharp, time_to_switch
+from mdstopo.general.events.locate import (
+    AIM,
+    NEAREST,
+    RESOLUTION,
+    is_sharp,
+    step_beside_sharp,
+    time_to_sharp,
+    time_to_switch,
+)
 from mdstopo.general.events.locate import NEAR as NEAR_SWITCH
 from mdstopo.general.events.permanent_sets import begins_divided
 from mdstopo.general.integrators.braking import HELD, HOPELESS, brake_rate, friction_error
@@ -179,6 +187,7 @@ def advance_to_switch(
     Returns the length (s), whether a margin is used up at its end, and what `advance` returns of it.
     """
     length = c * h
+    resolution = RESOLUTION * (abs(t) + h)
     before = 0.0
     at_before = 0.0
     value = 0.0
@@ -200,8 +209,8 @@ def advance_to_switch(
             rate = (value - at_before) / (length - before)
         before = length
         at_before = value
-        shift = -(value + AIM * rounding) / rate if rate < 0.0 else 4e-16 * (abs(t) + h) * 4.0**tries
-        length = min(max(length + shift, 0.5 * length, 4e-16 * (abs(t) + h)), h)
+        shift = -(value + AIM * rounding) / rate if rate < 0.0 else resolution * 4.0**tries
+        length = min(max(length + shift, 0.5 * length, resolution), h)
     return length, value < -rounding, singular
 
 

@@ -21,6 +21,7 @@ from mdstopo.general.events.event_log import CHATTER, log_at_breakpoint, log_swi
 from mdstopo.general.events.events import first_sign, has_switches, room_for_watched, smallest_margin, watch_all
 from mdstopo.general.events.locate import (
     CUTS,
+    RESOLUTION,
     TRIALS,
     cut_at,
     foreseen_trial,
@@ -275,7 +276,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                             model, member_state, segment, t, piece, stop, curve_q, curve, trials, tries, rounding,
                             watched, trial_q, trial[VELOCITY], rel,
                         )  # fmt: skip
-                        middle = next_trial(low, high, at_low, at_high, foreseen, rounding, 4e-16 * (abs(t) + h), tries)
+                        middle = next_trial(
+                            low, high, at_low, at_high, foreseen, rounding, RESOLUTION * (abs(t) + h), tries
+                        )
                         if middle < 0.0:
                             break
                         copy_rows(state, kept)
