@@ -25,12 +25,12 @@ from mdstopo.cli.options import (
 from mdstopo.cli.output import Output, duration, number, write
 from mdstopo.cli.progress import display
 from mdstopo.cli.uncertain_numbers import document_of, lines_of
+from mdstopo.shown import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mdstopo.shown import counted
-from mdstopo.session.outcome import ChosenSizes, Outcome
+    from mdstopo.session.outcome import ChosenSizes, Outcome
 
 _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is neither there nor gone
 
