@@ -22,7 +22,7 @@ from scipy.interpolate import CubicSpline
 from benchmarks.forces import whole_forces
 from mdstopo import Case, simulate
 from mdstopo.case.model import Response, ResponseRow, VolumeRow
-from mdstopo.general.driver.general_driver import GeneralSteps
+from mdstopo.general.driver.general_steps import GeneralSteps
 
 Floats = NDArray[np.float64]
 

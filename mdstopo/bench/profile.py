@@ -39,7 +39,7 @@ PHASES = {
     "compare": "responses",
     "sample_response": "responses",
     "rows_vjp": "reverse sweeps",
-    "peaks_vjp": "responses with their reverse sweeps",
+    "rows_with_gradients": "responses with their reverse sweeps",
     "integral_with_gradient": "integrals with their reverse sweeps",
 }
 ROUNDS = 7

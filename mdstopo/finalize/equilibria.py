@@ -15,9 +15,9 @@ from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Case
 from mdstopo.case.words import number_text, shown
 from mdstopo.engine import Evaluator
+from mdstopo.general.at_rest.settle import settle
 from mdstopo.general.driver.general_driver import GeneralDriver
-from mdstopo.general.driver.settle import settle
-from mdstopo.general.driver.start import size_of
+from mdstopo.general.scene.extent import size_of
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 
 #: the farthest that an equilibrium goes in one step of the sizes: in sizes of the scene, and in rad

@@ -1,4 +1,4 @@
-"""The static equilibrium at which a motion starts (`general.driver.settle` finds it)."""
+"""The static equilibrium at which a motion starts (`general.at_rest.settle` finds it)."""
 
 from dataclasses import dataclass
 

@@ -9,7 +9,7 @@ import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general.driver.competing_members import _heights, compare
+from mdstopo.general.over_time.competing_members import _heights, compare
 from mdstopo.integrators.steps import OF_SAMPLES, OK
 
 GRID = """

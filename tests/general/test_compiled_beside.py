@@ -32,8 +32,8 @@ MEAN = ("max_abs", "mean")
 @pytest.mark.parametrize(
     ("text", "names"),
     [
-        (CASE, {"peaks_vjp"}),
-        (CASE.replace("max_abs", "final"), {"peaks_vjp"}),
+        (CASE, {"rows_with_gradients"}),
+        (CASE.replace("max_abs", "final"), {"rows_with_gradients"}),
         (CASE.replace(*MEAN), {"integral_with_gradient"}),
         (CASE + SECOND + TOGETHER, {"rows_vjp", "peaks_of_steps"}),
         (CASE + SECOND.replace(*MEAN) + TOGETHER, {"rows_vjp", "peaks_of_steps", "integral_with_gradient"}),

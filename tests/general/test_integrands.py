@@ -428,7 +428,7 @@ def test_what_joints_hold_at_zero_takes_no_more_steps():
 
 
 def test_rounding_is_not_halved_on_and_on():
-    from mdstopo.general.driver.quadrature_breakpoints import halves
+    from mdstopo.general.over_time.quadrature_breakpoints import halves
 
     rng = np.random.default_rng(0)
     nodes, weights = np.polynomial.legendre.leggauss(5)

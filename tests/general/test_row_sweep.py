@@ -7,7 +7,8 @@ import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general.driver import competing_members, row_gradients
+from mdstopo.general.driver import row_gradients
+from mdstopo.general.over_time import competing_members
 from tests.general.support import design_of, load
 from tests.general.test_across import SCENE, STRUCK, VARIABLES, case_of
 from tests.general.test_competing_members import GRID

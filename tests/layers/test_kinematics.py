@@ -32,7 +32,7 @@ NO_STRIDES = {
     ("accelerations.py", "3 * model.size[1] + 1"): "a banded matrix with room for its pivots",
     ("accelerations.py", "3 * both * both"): "K, C and the mass of a pair",
     ("gauss_window.py", "6 * n"): "changes of a node's state, and inverse masses",
-    ("peak_gradients.py", "np.empty(3)"): "a response, its rate and its member",
+    ("rows_with_gradients.py", "np.empty(3)"): "a response, its rate and its member",
     ("priced_candidates.py", "range(3)"): "what a law's modes are, and what a step is",
     ("compile_general.py", "reshape(-1, 6)"): "columns of a response",
     ("general_driver.py", "np.zeros((1, 3))"): "a response, its rate and its member",

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from mdstopo.case.integrators import IntegratorKind
-from mdstopo.general.peaks import dense_output, peak_gradients, peak_search
+from mdstopo.general.peaks import dense_output, peak_search, rows_with_gradients
 from mdstopo.general.sensitivity import direct, integral_gradients, row_sweep
 
 
@@ -21,7 +21,7 @@ class Entries(NamedTuple):
     integral_with_gradient: Any = integral_gradients.integral_with_gradient
     peaks_of_pieces: Any = peak_search.peaks_of_pieces
     peaks_of_steps: Any = peak_search.peaks_of_steps
-    peaks_vjp: Any = peak_gradients.peaks_vjp
+    rows_with_gradients: Any = rows_with_gradients.rows_with_gradients
     push: Any = direct.push
     rank_rows: Any = peak_search.rank_rows
     rows_vjp: Any = row_sweep.rows_vjp

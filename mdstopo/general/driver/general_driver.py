@@ -8,32 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.memory import most_floats, room_factor
-from mdstopo.case.model import GROUND, Case, Joint, MemberGroup
+from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.case.over_time import ReductionKind
 from mdstopo.case.responses import kind_of
 from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.evaluation import USUAL, Rows, Shape
-from mdstopo.general.driver.competing_members import compete, members_peaks
-from mdstopo.general.driver.minima import Pieces, minima
-from mdstopo.general.driver.quadrature_breakpoints import ROUNDS, quadrature_breakpoints
+from mdstopo.general.at_rest.joints_at_start import fitted_start
+from mdstopo.general.at_rest.start import SettledStart
+from mdstopo.general.driver.blame import named_member, why_it_ended
+from mdstopo.general.driver.general_steps import GeneralSteps
 from mdstopo.general.driver.ready import Ready
 from mdstopo.general.driver.row_gradients import BLOCK, RowGradients
-from mdstopo.general.driver.start import FITS, SettledStart, size_of, speed_of
-from mdstopo.general.driver.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.model.general_model import (
     CODE,
-    COUNT,
-    GROUP,
     INERTER,
-    JOINT_FIRST,
-    OFFSET,
-    START,
     VARIED_PLACE,
     GeneralModel,
     pack_general,
 )
+from mdstopo.general.over_time.competing_members import compete, members_peaks
+from mdstopo.general.over_time.minima import minima
+from mdstopo.general.over_time.pieces import Pieces
+from mdstopo.general.over_time.quadrature_breakpoints import ROUNDS, quadrature_breakpoints
+from mdstopo.general.over_time.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.responses.extremes import (
     COLUMNS,
     FRACTION,
@@ -50,25 +48,20 @@ from mdstopo.general.responses.response_shapes import shape_of
 from mdstopo.general.scene.compile_general import GeneralScene, compile_general
 from mdstopo.general.scene.dimension import dimension_of
 from mdstopo.general.scene.further_times import landed
-from mdstopo.general.scene.turning_drives import global_moments
 from mdstopo.general.scene.variables import Placing
 from mdstopo.general.steps.step_history import FACTORS, GRAZES, POSES, WINDOWS, history_room
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
 from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult
 from mdstopo.integrators.steps import (
-    CHATTERING,
     HALF_TURN,
     NEEDS_ROOM,
     OK,
-    SINGULAR,
     STEP_LIMIT,
     UNSETTLED,
     WORK,
     status_of,
 )
-from mdstopo.mechanics.joints.joint_table import describe
 from mdstopo.mechanics.laws.law_table import SPRING
-from mdstopo.scene.diagnosis import fastest_body, member_in_words
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.scene.vibration_modes import Modes
@@ -256,50 +249,11 @@ class GeneralDriver:
         """Refuse joints that do not fit at the start, or move the start where the case asks for it (CaseError)."""
         if not len(self.scene.model.joint):
             return
-        move = self.case.solver.assemble
-        q, v, mistakes = self._fitted(move)
-        if mistakes:
-            hint = self._remedy([joint for joint, _ in mistakes])
-            raise CaseError(
-                [self.case.marks.mistake(f"joints[{joint.index}]", text + hint) for joint, text in mistakes],
-                str(self.case.path or self.case.name),
-            )
+        q, v = fitted_start(self)
         self.moved = float(np.abs(self.scene.kinematics.difference(q, self.scene.model.q0)).max())
-        if move:
+        if self.case.solver.assemble:
             self._start = q, v
             self._place()
-
-    def _fitted(self, move: bool) -> tuple[FloatArray, FloatArray, list[tuple[Joint, str]]]:
-        """The start (q, v), moved to the nearest that fits if asked for, and which joints do not fit there, and how."""
-        from mdstopo.general.statics.start_entry import assemble
-
-        model = self.scene.model
-        q, v = model.q0.copy(), model.v0.copy()
-        phi, rates = np.zeros((2, *model.row.shape))
-        assemble(self.ints, self.floats, q, v, move, phi, rates)
-        size = size_of(self.case)
-        span = self.scene.load_case.end - self.scene.load_case.start
-        speed = max(speed_of(self.case, v, self.scene.kinematics), size / span)
-        mistakes = []
-        for j, joint in enumerate(self.case.joints):
-            misfit, rate = float(np.abs(phi[j]).max()), float(np.abs(rates[j]).max())
-            if misfit > FITS * size:
-                problem = "cannot be assembled" if move else "does not fit at the start"
-                mistakes.append((joint, f"{describe(joint)} {problem}: its misfit is {misfit:.3g} (m or rad)"))
-            elif rate > FITS * speed:
-                mistakes.append(
-                    (joint, f"the start velocities tear {describe(joint)} apart at {rate:.3g} (m/s or rad/s)")
-                )
-        return q, v, mistakes
-
-    def _remedy(self, joints: list[Joint]) -> str:
-        """What helps where these joints do not fit at the start, or what is in the way."""
-        if not self.case.solver.assemble and not self._fitted(move=True)[2]:
-            return "; `solver: {assemble: true}` moves the start to the nearest that fits"
-        held = {name for joint in joints for name in joint.bodies}
-        driven = [motion.body for motion in self.scene.load_case.motions if motion.body in held]
-        moves = "moves" if len(driven) == 1 else "move"
-        return f"; no start fits it while {' and '.join(driven)} {moves} as prescribed" if driven else ""
 
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate alpha (N,) and evaluate all responses; `self.work` holds the counts of this call."""
@@ -440,7 +394,7 @@ class GeneralDriver:
 
     @cached_property
     def _plain_rows(self) -> bool:
-        """Whether one compiled call (`peaks_vjp`) finds the rows of an evaluation with their gradients.
+        """Whether one compiled call (`rows_with_gradients`) finds the rows of an evaluation with their gradients.
 
         There is one response, not of competing members, of which the largest value, the largest magnitude or the end is
         meant; peaks are those of the response itself, without switches; and the motion starts as stated.
@@ -456,7 +410,8 @@ class GeneralDriver:
         """Rows of the only response, with their gradients; False where these are still to be found."""
         (reduction,) = self.scene.reductions
         found, differentiated = self.ready.often(
-            "peaks_vjp", self.entry.peaks_vjp, (self.floats, self.rows), ((COUNT_AT, count), (WINDOW_AT, window)),
+            "rows_with_gradients", self.entry.rows_with_gradients, (self.floats, self.rows),
+            ((COUNT_AT, count), (WINDOW_AT, window)),
             lambda: self._plain_arguments(count, window),
         )  # fmt: skip
         self.found[0] = found
@@ -465,7 +420,7 @@ class GeneralDriver:
         return bool(differentiated)
 
     def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:
-        """All arguments of `peaks_vjp`; count and window stand at `COUNT_AT` and `WINDOW_AT`."""
+        """All arguments of `rows_with_gradients`; count and window stand at `COUNT_AT` and `WINDOW_AT`."""
         (reduction,) = self.scene.reductions
         return (
             *self.steps_arguments(count), 0, reduction.is_magnitude, reduction.at_end, self.steps_are_fine, window,
@@ -534,7 +489,7 @@ class GeneralDriver:
         places: FloatArray,
         exact: bool,
         count: int,
-        steps: "GeneralSteps | None" = None,
+        steps: GeneralSteps | None = None,
         who: int = -1,
         rates: bool = True,
     ) -> tuple[tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
@@ -633,7 +588,7 @@ class GeneralDriver:
         """
         entry, reductions = self.entry, self.scene.reductions
         if self._plain_rows:
-            entry.peaks_vjp.compile(*self._plain_arguments(0, 0.0))
+            entry.rows_with_gradients.compile(*self._plain_arguments(0, 0.0))
             return
         if not all(reduction.is_integral for reduction in reductions):
             self.row_gradients.compile()
@@ -685,7 +640,7 @@ class GeneralDriver:
             if code != NEEDS_ROOM:
                 code, count, time = self._up_to_half_a_turn(code, count, time)
                 self.count = count
-                self._message = self._explain(code, time)
+                self._message = why_it_ended(self, code, time)
                 return code, count, time
             if not self._grow():
                 self._message = self._full(count, time)
@@ -713,7 +668,7 @@ class GeneralDriver:
 
     def start_modes(self, alpha: FloatArray) -> Modes:
         """Small motion about the start."""
-        from mdstopo.general.driver.vibration import start_modes
+        from mdstopo.general.at_rest.vibration import start_modes
 
         return start_modes(self, alpha)
 
@@ -802,24 +757,6 @@ class GeneralDriver:
         at_v = len(model.mass) + len(model.q0)
         return floats[len(model.mass) : at_v].copy(), floats[at_v : at_v + len(model.v0)].copy()
 
-    def _explain(self, code: int, time: float) -> str:
-        if code == OK:
-            return ""
-        when = f"at t = {time:.6g} s"
-        if code == SINGULAR:
-            steps = f", in steps of {self.settings[2]:.3g} s" if self.settings[2] > 0.0 else ""
-            return f"{self._singular(int(self.where[0]))}, {when}{steps}"
-        if code == HALF_TURN:
-            bushing = self.case.bushings[int(self.where[0])]
-            return f"bushings[{bushing.index}] (between {bushing.bodies[0]} and {bushing.bodies[1]}), {when}"
-        if code == CHATTERING:
-            return f"{self.member(int(self.where[0]))}, {when}"
-        if code == STEP_LIMIT and self.where[0] >= 0:
-            who = self.member(int(self.where[0]))
-            return f"{when}; {who} brakes too fast for explicit steps: a larger slip or a smaller damping needs fewer"
-        v = self.states()[2][self._steps_until(time), : self.scene.n].reshape(self.scene.n_bodies, -1)
-        return f"{when}; the fastest body is {fastest_body(self.scene.bodies, v)}"
-
     def states(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Times, coordinates and velocities of all steps, as views of the driver's arrays, with unused entries behind
         them."""
@@ -828,112 +765,19 @@ class GeneralDriver:
         end = at_v + steps * len(model.v0)
         return room[:steps], room[steps:at_v].reshape(steps, -1), room[at_v:end].reshape(steps, -1)
 
-    def _steps_until(self, time: float) -> int:
-        return int(np.argmin(np.abs(self.states()[0] - time)))
-
-    def _singular(self, place: int) -> str:
-        """The joint whose row stands at a place of the matrix, or the body whose coordinate does."""
-        model = self.scene.model
-        n = len(model.mass)
-        if place >= len(model.unknown_index):
-            return describe(self.case.joints[place - len(model.unknown_index)])
-        unknown = int(np.flatnonzero(model.unknown_index == place)[0])
-        if unknown >= n:
-            return describe(self.case.joints[int(np.argwhere(model.row == unknown - n)[0, 0])])
-        body = unknown // self.scene.kinematics.freedoms
-        tied = [joint for joint in self.case.joints if self.scene.bodies[body] in joint.bodies]
-        return describe(tied[0]) if tied else f"body {self.scene.bodies[body]}"
-
     def member(self, padded: int) -> str:
         """A member (or contact) in words, from its place in the padded arrays."""
-        if padded >= self.scene.model.member.shape[1]:
-            return self.scene.contacts[int(padded - self.scene.model.member.shape[1])]
-        for block in self.scene.model.block.tolist():
-            i = padded - block[START]
-            if 0 <= i < block[COUNT]:
-                group = self.case.members[block[GROUP]]
-                return member_in_words(group, i + block[OFFSET])
-        return "a member"
+        return named_member(self, padded)
 
     def displacements(self, q: FloatArray) -> FloatArray:
         """(T, n_body, D): by how much bodies have moved and turned (m, rad) at q (T, n_q) since its first row."""
         bodies = self.scene.kinematics
         return bodies.differences(q, q[0]).reshape(len(q), -1, bodies.freedoms)
 
-    def simulate(self, alpha: FloatArray) -> tuple[Status, "GeneralSteps"]:
+    def simulate(self, alpha: FloatArray) -> tuple[Status, GeneralSteps]:
         """Simulate alpha (N,); the steps come back in arrays of their own."""
         code, count, _ = self.run(alpha, False)
         return status_of(code), GeneralSteps(self, count)
-
-
-class GeneralSteps:
-    """The steps of one simulation, and the motion between them (`integrators.scene_driver.Steps`)."""
-
-    def __init__(self, driver: GeneralDriver, count: int) -> None:
-        self._driver = driver
-        # the model too: a later evaluation may land on other times (`GeneralDriver.run`)
-        packed = driver.ints, driver.floats
-        self.kept = packed, driver.limits, driver.room.copy(), driver.room_ints.copy(), driver.member_state.copy()
-        self.count = count
-        t, q, v = driver.states()
-        self.t: FloatArray = t[: count + 1].copy()
-        self.q: FloatArray = q[: count + 1].copy()
-        self.v: FloatArray = v[: count + 1].copy()
-
-    def balanced(self, times: FloatArray) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """States and accelerations at times (T,): q (T, n_q), v, a (T, n) and lam (T, n_rows) of joints and motions;
-        right-continuous."""
-        if self.count == 0:
-            raise ValueError("no step was completed")
-        step = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, self.count - 1)
-        fraction = (times - self.t[step]) / (self.t[step + 1] - self.t[step])
-        fraction[times == self.t[step + 1]] = 1.0
-        places = np.stack([step.astype(np.float64), fraction], axis=1)
-        (q, out), solved, _ = self._driver.sample_response(-1, places, True, self.count, self)
-        return (q, out[0], out[1]), self._all_rows(q, solved)
-
-    def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Coordinates q (T, n_q), velocities v and accelerations a (T, n) at times (T,) within what was simulated."""
-        return self.balanced(np.asarray(times, dtype=np.float64))[0]
-
-    def _all_rows(self, q: FloatArray, solved: FloatArray) -> FloatArray:
-        """The multipliers of all rows, joints then motions; where rows repeat others, those of least norm."""
-        model = self._driver.scene.model
-        n_row = int(model.size[0])
-        places = [(j, r) for j in range(len(model.joint)) for r in range(int(model.joint[j, 4]))]
-        lam = np.zeros((len(q), len(places)))
-        for i, (j, r) in enumerate(places):
-            if model.row[j, r] >= 0:
-                lam[:, i] = solved[:, model.row[j, r]]
-        if n_row < len(places):
-            each = self._driver.scene.kinematics.freedoms
-            slopes_of = self._driver.scene.kinematics.of_python("slopes_of")
-            phi, jac = np.zeros(model.row.shape), np.zeros((*model.row.shape, 2 * each))
-            for k in range(len(q)):
-                slopes_of(model.joint, model.joint_par, model.home, q[k].copy(), phi, jac)
-                dense = np.zeros((len(places), len(model.mass)))
-                for i, (j, r) in enumerate(places):
-                    for c in range(2 * each):
-                        dense[i, each * int(model.joint[j, JOINT_FIRST + c // each]) + c % each] += jac[j, r, c]
-                dense[:, model.free == 0] = 0.0
-                lam[k] = np.linalg.lstsq(dense.T, dense.T @ lam[k], rcond=1e-10)[0]
-        return np.concatenate([lam, global_moments(model, q, solved[:, n_row:])], axis=1)
-
-    def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
-        """Joint name -> force and moment (T, D) on its first body, at states q (T, n_q) with lam (T, n_rows)."""
-        model = self._driver.scene.model
-        row = np.full(model.row.shape, -1, dtype=np.int64)
-        i = 0
-        for j in range(len(model.joint)):
-            for r in range(int(model.joint[j, 4])):
-                row[j, r] = i
-                i += 1
-        full = np.zeros((len(q), len(model.q0)))
-        full[:, : q.shape[1]] = q
-        out = np.zeros((len(q), len(model.joint), self._driver.scene.kinematics.freedoms))
-        of_all = self._driver.scene.kinematics.of_python("reactions")
-        of_all(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
-        return {joint.name: out[:, j].copy() for j, joint in enumerate(self._driver.case.joints)}
 
 
 def _scenes(case: Case) -> Mapping[str, GeneralScene]:

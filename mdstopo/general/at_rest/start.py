@@ -11,31 +11,23 @@ takes part if it acts at the start, so no time at which one begins or ends to ac
 the start, where the equilibrium jumps.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.model import Case
-from mdstopo.general.driver.since_settled import SinceSettled
+from mdstopo.general.at_rest.joints_at_start import FITS
+from mdstopo.general.at_rest.since_settled import SinceSettled
+from mdstopo.general.driver_interface import DriverWithStart
 from mdstopo.general.model.general_model import COUNT, DESIGN, START
+from mdstopo.general.scene.extent import size_of, speed_of
 from mdstopo.mechanics.joints.joint_table import describe
-from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
-from mdstopo.scene.bodies import distances
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver.general_driver import GeneralDriver
-
-#: misfit of a joint at the start, relative to the scene's size or speeds, up to which it fits
-FITS = 1e-8
 
 
 class SettledStart:
     """The equilibrium at which the motion of one driver starts; `settled` is that of the last design."""
 
-    def __init__(self, driver: "GeneralDriver") -> None:
+    def __init__(self, driver: DriverWithStart) -> None:
         self._driver = driver
         self._stated: FloatArray = driver.packed_start()[0]
         self._design: bytes | None = None
@@ -51,7 +43,7 @@ class SettledStart:
         design = driver.alpha.tobytes() + driver.values.tobytes()
         if self._design == design:
             return True
-        from mdstopo.general.driver.settle import settle
+        from mdstopo.general.at_rest.settle import settle
 
         self._design = None
         driver.start_from(self._stated)
@@ -132,24 +124,3 @@ class SettledStart:
         if problem:
             text = f"{problem} (load case {scene.load_case.name}, initial design)"
             raise CaseError([case.marks.mistake("solver.settle", text)], str(case.path or case.name))
-
-
-def size_of(case: Case) -> float:
-    """The largest distance between bodies and points, m."""
-    points = [np.array([body.position for body in case.bodies])]
-    points += [grid.world for grid in case.points.values()]
-    points += [np.concatenate([group.from_world, group.to_world]) for group in case.members]
-    cloud = np.concatenate(points)
-    for joint in case.joints:
-        for name, at in zip(joint.bodies, (joint.at_first, joint.at_second), strict=True):
-            centre = np.zeros(len(at)) if name == "ground" else np.array(case.body(name).position)
-            cloud = np.concatenate([cloud, [centre + np.array(at)]])
-    low, high = cloud.min(axis=0), cloud.max(axis=0)
-    size = float(distances(high - low))
-    return size if size > 0.0 else 1.0
-
-
-def speed_of(case: Case, v: FloatArray, kinematics: Kinematics) -> float:
-    """The largest speed of a body's centre or of a point a scene's size away from it, at velocities v (n,), m/s."""
-    moves, turns = kinematics.shifts_and_turns(v)
-    return float((distances(moves) + size_of(case) * distances(turns)).max())

@@ -10,20 +10,17 @@ stay.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.general.driver.kinks import kinks
-from mdstopo.general.driver.start import size_of
+from mdstopo.general.driver_interface import DriverWithRun
+from mdstopo.general.over_time.kinks import kinks
 from mdstopo.general.responses.general_responses import LISTED, has_kinks, is_expression, switches_of
+from mdstopo.general.scene.extent import size_of
 from mdstopo.general.steps.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than a method's own weights; than collocation's, too
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -46,7 +43,7 @@ APART = 1e-10
 Integrand = Callable[[FloatArray, IndexArray], FloatArray]
 
 
-def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
+def quadrature_breakpoints(driver: DriverWithRun, count: int) -> list[float]:
     """Times at which steps are to end, beside `driver.quadrature_breakpoints`, from the `count` steps of its last
     run."""
     model, found = driver.scene.model, list[float]()
@@ -79,7 +76,7 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
     return found
 
 
-def _integrand(driver: "GeneralDriver", j: int, t: FloatArray, ends: FloatArray, square: bool) -> Integrand:
+def _integrand(driver: DriverWithRun, j: int, t: FloatArray, ends: FloatArray, square: bool) -> Integrand:
     """Values of response j; those of an expression with switches go on between two `ends` as they are in their middle.
 
     driver: with a finished run. t (m + 1,): its steps' times (s).
@@ -109,7 +106,7 @@ def _integrand(driver: "GeneralDriver", j: int, t: FloatArray, ends: FloatArray,
     return on_sides
 
 
-def _rule(driver: "GeneralDriver", count: int) -> FloatArray:
+def _rule(driver: DriverWithRun, count: int) -> FloatArray:
     """Nodes and weights (2, s) on (0, 1) by which stages integrate; where steps differ in that, the least of them."""
     tables, model = driver.method.tables, driver.scene.model
     if driver.method.collocates:
@@ -124,7 +121,7 @@ def _rule(driver: "GeneralDriver", count: int) -> FloatArray:
     return np.stack([vectors[0][weighed], vectors[2][weighed]])
 
 
-def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
+def _rounding(driver: DriverWithRun, j: int, span: float) -> float:
     """What response j may be by rounding alone, where that can be said: what joints hold at zero is never more."""
     kind, _, _, _, order, _ = driver.scene.model.response[j].tolist()
     if is_expression(driver.scene.model, j) or LISTED[kind].needs_accelerations:

@@ -5,18 +5,14 @@ one that competes is followed by itself, through its own peaks; the highest of a
 and time.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mdstopo.case.over_time import ReductionKind
+from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import COUNT, GROUP, MEMBER_FORCE, OFFSET, SUBJECT
 from mdstopo.general.peaks.peak_search import ALIKE, EVEN, MARGIN
 from mdstopo.general.responses.extremes import FRACTIONS, row_of
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: members that are followed at most, unless more rows than these are asked for
 FOLLOWED = 12
@@ -35,7 +31,7 @@ def compete(kind: int, reduction: ReductionKind) -> bool:
 
 
 def members_peaks(
-    driver: "GeneralDriver", j: int, t: FloatArray, final: bool, window: float, most: int
+    driver: DriverWithRun, j: int, t: FloatArray, final: bool, window: float, most: int
 ) -> list[FloatArray]:
     """The peaks over time of the members' forces from which response j is the largest, as rows of `extremes`.
 
@@ -104,7 +100,7 @@ def _places(steps: IndexArray, fractions: FloatArray) -> FloatArray:
 
 
 def _inside(
-    driver: "GeneralDriver", j: int, t: FloatArray, who: IndexArray, ends: FloatArray, limit: float
+    driver: DriverWithRun, j: int, t: FloatArray, who: IndexArray, ends: FloatArray, limit: float
 ) -> tuple[FloatArray, IndexArray]:
     """Forces and rates at all FRACTIONS, from those at the ends of the steps.
 
@@ -146,7 +142,7 @@ def _limit(top: FloatArray, least: float, most: int) -> float:
 
 
 def compare(
-    driver: "GeneralDriver", j: int, places: FloatArray, who: IndexArray, count: int, exact: bool = False
+    driver: DriverWithRun, j: int, places: FloatArray, who: IndexArray, count: int, exact: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """The largest |f*| of every member (N), and f* with its rate of some (N, N/s).
 
@@ -165,7 +161,7 @@ def compare(
     return top, seen
 
 
-def members_of(driver: "GeneralDriver", j: int) -> int:
+def members_of(driver: DriverWithRun, j: int) -> int:
     """How many members the group has whose forces response j is."""
     block = driver.scene.model.block
     own = block[block[:, GROUP] == driver.scene.model.response[j, SUBJECT]]

@@ -8,18 +8,15 @@ step beside a norm's zero they belong to a vector that all but vanishes: what th
 which is more than the step is, would turn it anywhere. Steps beside a zero are therefore short (`BESIDE`).
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from mdstopo.general.driver.minima import LOW, Pieces
+from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import GeneralModel
+from mdstopo.general.over_time.minima import LOW
+from mdstopo.general.over_time.pieces import Pieces
 from mdstopo.general.responses.extremes import FRACTION, STEP, VALUE, EvaluateAt
 from mdstopo.general.responses.general_responses import has_kinks, has_norm, is_expression
 from mdstopo.scene.springs_model import FloatArray
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: how long the steps beside a norm's zero are, relative to the step that it was found in: the last stage of a step is
 #: off by its length to the sixth power or so
@@ -28,7 +25,7 @@ BESIDE = 0.1
 DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
 
 
-def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
+def kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
     """Times inside (t[0], t[-1]) at which steps have to end because response j has a kink there; t (m + 1,): the steps'
     times."""
     pieces = Pieces(driver, j, t)

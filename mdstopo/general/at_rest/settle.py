@@ -12,15 +12,13 @@ K dq + Phi_q^T dlam = dF, Phi_q dq = 0: `inverse` is that linear map.
 Every search begins at the stated configuration, whatever was found before.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from mdstopo.general.driver_interface import DriverWithStart
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: pseudo-steps at most, and the farthest that one goes, relative to the scene
 MOST, FAR = 400, 0.1
@@ -38,7 +36,7 @@ NEAR, ARRIVED = 1e-6, 1e-13
 FREE = 1e-9
 
 
-def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:
+def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:
     """The equilibrium of alpha (N,) from q0 (n_q,), with the laws as the driver has packed them; or why there is none.
 
     size: of the scene, m.
@@ -121,7 +119,7 @@ def _stepped(
     return there, left, share, off
 
 
-def _nowhere(driver: "GeneralDriver", shift: FloatArray, arms: FloatArray) -> str:
+def _nowhere(driver: DriverWithStart, shift: FloatArray, arms: FloatArray) -> str:
     """Why there is no equilibrium: the body that has moved most by a shift (n,), with angles times arms (n,)."""
     far = np.abs(shift * arms).reshape(-1, driver.scene.kinematics.freedoms).max(axis=1)
     body = driver.scene.bodies[int(far.argmax())]
@@ -131,7 +129,7 @@ def _nowhere(driver: "GeneralDriver", shift: FloatArray, arms: FloatArray) -> st
 class _AtRest:
     """Forces and stiffness at one configuration, in coordinates scaled by the roots of masses: u = M^(1/2) q."""
 
-    def __init__(self, driver: "GeneralDriver", alpha: FloatArray, size: float) -> None:
+    def __init__(self, driver: DriverWithStart, alpha: FloatArray, size: float) -> None:
         model = driver.scene.model
         n, n_row = len(model.mass), int(model.size[0])
         self._driver, self._alpha, self._size = driver, alpha, size

@@ -1,4 +1,5 @@
-"""Peaks of one response, or its value at the end, and their gradients in one call: all that most evaluations need.
+"""The rows of one response, its peaks or its value at the end, with their gradients in one call: all that most
+evaluations need.
 
 It does what `peak_search.peaks_of_steps`, or `dense_output.sample_response` at the end, and then `row_sweep.rows_vjp`
 of the rows that were found do.
@@ -18,7 +19,7 @@ from mdstopo.integrators.steps import OF_SAMPLES
 
 
 @entry
-def peaks_vjp(
+def rows_with_gradients(
     tag, ints, floats, tables, alpha, limits, count, j, both, at_end, fine, closeness, room, room_ints, member_state,
     padded, out, gradients, work,
 ):  # fmt: skip

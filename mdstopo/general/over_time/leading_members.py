@@ -9,19 +9,17 @@ alone, actuators at their limit, symmetry) do not cross between them.
 
 from collections.abc import Callable, Iterator
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from mdstopo.general.driver.competing_members import compare, members_of
+from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import KIND, MEMBER_FORCE
+from mdstopo.general.over_time.competing_members import compare, members_of
 from mdstopo.general.responses.extremes import FRACTIONS
 from mdstopo.general.responses.general_responses import TIE
 from mdstopo.general.responses.sampled_roots import roots_between
 from mdstopo.scene.springs_model import FloatArray, IndexArray
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: samples of a step in which several members may lead
 FINE = np.linspace(0.0, 1.0, 17)
@@ -47,7 +45,7 @@ class Lead(NamedTuple):
     member: int
 
 
-def leads(driver: "GeneralDriver", j: int, t: FloatArray) -> list[Lead]:
+def leads(driver: DriverWithRun, j: int, t: FloatArray) -> list[Lead]:
     """The members that carry the largest force of response j one after the other, in order of time; t (m + 1,): the
     steps' times."""
     count, members = len(t) - 1, members_of(driver, j)
@@ -77,13 +75,13 @@ def changes(leads_of: list[Lead], t: FloatArray) -> list[float]:
     return [float(t[lead.step] + lead.low * (t[lead.step + 1] - t[lead.step])) for lead in leads_of if lead.low > 0.0]
 
 
-def is_led(driver: "GeneralDriver", j: int) -> bool:
+def is_led(driver: DriverWithRun, j: int) -> bool:
     """Whether response j is the largest of the forces of several members."""
     return bool(driver.scene.model.response[j, KIND] == MEMBER_FORCE) and members_of(driver, j) > 1
 
 
 def _forces(
-    driver: "GeneralDriver", j: int, count: int, steps: IndexArray, fractions: FloatArray, who: IndexArray
+    driver: DriverWithRun, j: int, count: int, steps: IndexArray, fractions: FloatArray, who: IndexArray
 ) -> tuple[FloatArray, FloatArray]:
     """Forces f* of some members and their rates, at the same fractions of several steps.
 
@@ -124,7 +122,7 @@ def _different(force: FloatArray) -> IndexArray:
     return np.array(kept, dtype=np.int64)
 
 
-def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who: IndexArray) -> list[Lead]:
+def _in_step(driver: DriverWithRun, j: int, count: int, w: int, h: float, who: IndexArray) -> list[Lead]:
     """Who leads when within one step, in order of time.
 
     driver: of the load case, with its last motion.

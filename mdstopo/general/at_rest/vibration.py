@@ -1,20 +1,16 @@
 """Small undamped motion about the start of a general scene."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from mdstopo.general.driver_interface import DriverWithStart
 from mdstopo.scene.springs_model import FloatArray
 from mdstopo.scene.vibration_modes import Modes, modes_of
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: what a constraint leaves of a direction, relative, below which the direction is held
 HELD = 1e-9
 
 
-def start_modes(driver: "GeneralDriver", alpha: FloatArray) -> Modes:
+def start_modes(driver: DriverWithStart, alpha: FloatArray) -> Modes:
     """Small motion with the modes that members have at the start; shapes are of all freedoms, driven ones at rest."""
     from mdstopo.general.statics.start_entry import linearise
 

@@ -6,24 +6,20 @@ numbers of the response (`GeneralModel.response_par`), and differentiate with th
 -e . du/dq (q0), a cotangent of the start's positions, which `start.SettledStart` pulls through the equilibrium.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import COMPONENT
 from mdstopo.general.responses.extremes import FRACTION, STEP
 from mdstopo.mechanics.kinematics.components import NORM, Z
 from mdstopo.scene.springs_model import FloatArray
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver.general_driver import GeneralDriver
 
 
 class SinceSettled:
     """The displacements among a driver's responses that count from the settled start, and where they count from at
     present."""
 
-    def __init__(self, driver: "GeneralDriver") -> None:
+    def __init__(self, driver: DriverWithRun) -> None:
         self._driver = driver
         self._slopes: dict[int, FloatArray] = {
             j: np.zeros(0) for j, each in enumerate(driver.scene.responses) if each.since == "settled"

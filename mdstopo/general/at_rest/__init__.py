@@ -1,0 +1,1 @@
+"""Where a motion starts: its equilibrium, what counts from there, and small motion about it."""

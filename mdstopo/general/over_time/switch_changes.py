@@ -1,0 +1,56 @@
+"""When the switches of an expression change their sides: where their margins vanish, to the last digit."""
+
+import numpy as np
+
+from mdstopo.general.driver_interface import DriverWithRun
+from mdstopo.general.over_time.leading_members import Lead, apart
+from mdstopo.general.responses.extremes import FRACTIONS
+from mdstopo.general.responses.general_responses import switches_of
+from mdstopo.general.responses.sampled_roots import may_vanish, roots_between
+from mdstopo.scene.springs_model import FloatArray
+
+
+def switch_leads(driver: DriverWithRun, j: int, t: FloatArray) -> list[Lead]:
+    """The times between which the switches of expression j keep their sides, in order; t (m + 1,): the steps' times."""
+    count = len(t) - 1
+    fractions = np.array(FRACTIONS)
+    places = np.column_stack([np.repeat(np.arange(count), len(fractions)), np.tile(fractions, count)]).astype(float)
+    cuts = _cuts(driver, j, t, places)
+    middle = np.column_stack([np.arange(count), np.full(count, 0.5)])
+    sides = driver.sample_response(j, middle, False, count, rates=False)[2][:, 2]
+    found: list[Lead] = []
+    for w in range(count):
+        ends = [*apart([0.0, *sorted(cuts.get(w, []))]), 1.0]
+        who = [int(sides[w])]
+        if len(ends) > 2:
+            middles = 0.5 * (np.array(ends[:-1]) + np.array(ends[1:]))
+            inside = np.column_stack([np.full(len(middles), float(w)), middles])
+            seen = driver.sample_response(j, inside, True, count, rates=False)[2][:, 2]
+            who = [int(each) for each in seen]
+        for low, high, mode in zip(ends[:-1], ends[1:], who, strict=True):
+            if found and found[-1].step == w and found[-1].member == mode:
+                found[-1] = found[-1]._replace(high=high)
+            else:
+                found.append(Lead(w, low, high, mode))
+    return found
+
+
+def _cuts(driver: DriverWithRun, j: int, t: FloatArray, places: FloatArray) -> dict[int, list[float]]:
+    """By step, the fractions at which a margin vanishes. places (m K, 2): the FRACTIONS of all steps."""
+    count, samples = len(t) - 1, len(FRACTIONS)
+    cuts: dict[int, list[float]] = {}
+    for switch in range(switches_of(driver.scene.model, j)):
+        seen = driver.sample_response(j, places, False, count, who=-2 - switch)[2].reshape(count, samples, -1)
+        margin, rate = seen[:, :, 0], seen[:, :, 1] * (np.diff(t) / (samples - 1))[:, None]
+        for w, k in np.argwhere(may_vanish(margin, rate)).tolist():
+
+            def exact(c: FloatArray, w: int = w, who: int = -2 - switch) -> FloatArray:
+                at = np.column_stack([np.full(len(c), float(w)), c])
+                value: FloatArray = driver.sample_response(j, at, True, count, who=who, rates=False)[2][:, 0]
+                return value
+
+            span = FRACTIONS[k], FRACTIONS[k + 1]
+            values = float(margin[w, k]), float(margin[w, k + 1])
+            rates = float(rate[w, k]), float(rate[w, k + 1])
+            cuts.setdefault(w, []).extend(roots_between(span, values, rates, exact))
+    return cuts
