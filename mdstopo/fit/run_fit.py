@@ -48,7 +48,7 @@ class FitRun:
     starts: those that are done. trace: all evaluations of the starts. latest: the last of them. found, statistics: the
     best, and its statistics; None where none has a motion, or before all starts are done. profiles: by the name of the
     estimate. status: running | converged | max_iterations | failed | interrupted; reason: in words. simulations:
-    motions that were computed. concluded: whether these include the one at the minimum, from a run of before.
+    motions that were computed. concluded: whether the one at the minimum of these starts is among them.
     """
 
     problem: FitProblem
@@ -100,30 +100,40 @@ def run_fit(
     passing: is given what is known after each evaluation of a start.
     """
     run = FitRun(problem) if before is None else before
-    earlier = run.simulations
+    counted = problem.simulations  # of these motions of the problem
     run.status, run.found, run.statistics = "running", None, None
     run.trace = [each for each in run.trace if each.start < len(run.starts)]
 
+    def count() -> None:
+        nonlocal counted
+        run.simulations += problem.simulations - counted
+        counted = problem.simulations
+
     def keep() -> None:
-        run.simulations = earlier + problem.simulations
+        count()
         save(run)
+
+    def conclude() -> None:
+        nonlocal counted
+        count()
+        _conclude(run)
+        if run.concluded:  # the same again
+            counted = problem.simulations
+        run.concluded = True
 
     def seen(evaluated: Evaluated) -> None:
         run.latest = evaluated
         run.trace.append(Tried(len(run.starts), evaluated.x, problem.left(evaluated.misfit)))
-        run.simulations = earlier + problem.simulations
+        count()
         passing(run)
 
     try:
-        left = starts(problem)[len(run.starts) :]
-        for begin in left:
+        for begin in starts(problem)[len(run.starts) :]:
             end = fitted(problem, begin, stop, seen)
             run.starts.append(Start(begin, end.x, end.deviation, end.level, end.status, end.reason, end.evaluations))
+            run.concluded = False
             keep()
-        before_end = problem.simulations
-        _conclude(run)
-        if run.concluded and not left:  # the same again, which has been counted
-            earlier -= problem.simulations - before_end
+        conclude()
         keep()
         for name in _unprofiled(run, points) if points else ():
             _profile(run, name, points, stop)
@@ -132,9 +142,9 @@ def run_fit(
         run.status, run.reason = run.starts[run.best].status, run.starts[run.best].reason
     except StoppedError:
         if run.starts and run.found is None:
-            _conclude(run)
+            conclude()
         run.status, run.reason = "interrupted", "stopped on request; what is done is kept"
-    run.simulations = earlier + problem.simulations
+    count()
     return run
 
 

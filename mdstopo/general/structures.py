@@ -16,6 +16,7 @@ def __getattr__(name: str) -> type:
         from mdstopo.general.integrators import gauss_window, generalized_alpha_step  # noqa: F401
         from mdstopo.general.model import general_model, priced_candidates  # noqa: F401
         from mdstopo.general.peaks import dense_output  # noqa: F401
+        from mdstopo.general.pricing import priced_tile, sorted_members  # noqa: F401
         from mdstopo.general.steps import step_history  # noqa: F401
 
         numba()

@@ -14,12 +14,13 @@ import numpy as np
 from mdstopo.case.memory import room_factor
 from mdstopo.compiler.fields import aligned
 from mdstopo.evaluation import USUAL, Rows, Shape
-from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, quadrature_breakpoints
+from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, quadrature_breakpoints
 from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, Q, V, carve, room_for, status_of
 from mdstopo.mechanics.active_members import ROOMY
 from mdstopo.scene.compile_scene import Scene
 from mdstopo.scene.packing import Packed, pack
+from mdstopo.scene.signal_segments import cut_segments
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.status import Status
 
@@ -172,7 +173,7 @@ class Driver:
             if not more or found[0] != OK:
                 break
             times += more
-            self._take(pack(landed(self.scene.model, times)))
+            self._take(pack(cut_segments(self.scene.model, times)))
             before, found = left, self._run(tangent)
             more, total, left = quadrature_breakpoints(self, found[1])
             if lap >= PATIENCE and left > VAIN * before:

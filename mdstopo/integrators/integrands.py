@@ -8,7 +8,7 @@ a given order leaves. Steps that leave too much are halved, and the motion is co
 nothing was wrong, it is not taken.
 """
 
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +16,7 @@ import numpy as np
 from mdstopo.integrators.gauss_tables import LEGENDRE, LEVELS, gauss_tables
 from mdstopo.integrators.runge_kutta_tables import GENERAL, NYSTROEM, ORDERS, VECTORS, B, C, runge_kutta_tables
 from mdstopo.integrators.steps import ENERGY, FIRST, carve
-from mdstopo.scene.signal_segments import cut_linear, parents_of
-from mdstopo.scene.springs_model import FloatArray, IndexArray, Model
+from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.integrators.driver import Driver
@@ -30,14 +29,6 @@ PATIENCE, VAIN = 2, 0.7
 #: times less: of 60 random scenes one or two have such a step, in vain. So what changes the integral by less than the
 #: tolerance is not taken
 SHARE = 10.0
-
-
-def landed(model: Model, times: list[float]) -> Model:
-    """The model with further ends of segments; what acts in time is the same function as before."""
-    whole = np.unique(np.append(model.times, times))
-    parent, tau = parents_of(model.times, whole)
-    cut = partial(cut_linear, parent=parent, tau=tau)
-    return model._replace(times=whole, force=cut(model.force), load_force=cut(model.load_force))
 
 
 def quadrature_breakpoints(driver: "Driver", count: int) -> tuple[list[float], float, float]:

@@ -1,12 +1,32 @@
 """Piecewise linear signals of time, cut into segments at whose ends the integrators land."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import Load, LoadCase, Signal, Table
 from mdstopo.scene.springs_model import FloatArray, IndexArray
+
+#: times closer than this, relative to the whole, are no further ends of segments
+APART = 1e-10
+
+
+class Loaded(Protocol):
+    """A model, as a named tuple, with ends of segments (s) and the loads within them, as `segment_values` has them."""
+
+    @property
+    def times(self) -> FloatArray: ...
+    @property
+    def force(self) -> FloatArray: ...
+    @property
+    def load_force(self) -> FloatArray: ...
+    def _replace(self, *_parts: Any, **_values: Any) -> Self: ...
+
+
+LoadedModel = TypeVar("LoadedModel", bound=Loaded)
 
 
 def breakpoints(load_case: LoadCase, more: Iterable[float] = ()) -> FloatArray:
@@ -56,6 +76,23 @@ def formulas_of(load_case: LoadCase) -> list[TimeFormula]:
 def _nearness(start: float, end: float) -> float:
     """Times nearer to each other than this are the same, s."""
     return 1e-12 * (end - start) + 4e-15 * max(abs(start), abs(end))
+
+
+def cut_segments(model: LoadedModel, times: Sequence[float]) -> LoadedModel:
+    """The model with further times at which segments end; its loads are the same functions of time as before."""
+    old = model.times
+    apart = APART * float(old[-1] - old[0])
+    asked = np.sort(np.asarray(times, dtype=np.float64))
+    behind = np.clip(np.searchsorted(old, asked), 1, len(old) - 1)
+    far = np.minimum(np.abs(asked - old[behind - 1]), np.abs(old[behind] - asked)) > apart
+    new: list[float] = []
+    for time in asked[far].tolist():
+        if not new or time - new[-1] > apart:
+            new.append(time)
+    whole = np.sort(np.concatenate([old, new]))
+    parent, tau = parents_of(old, whole)
+    cut = partial(cut_linear, parent=parent, tau=tau)
+    return model._replace(times=whole, force=cut(model.force), load_force=cut(model.load_force))
 
 
 def parents_of(times: FloatArray, whole: FloatArray) -> tuple[IndexArray, FloatArray]:

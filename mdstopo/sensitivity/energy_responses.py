@@ -1,7 +1,7 @@
-"""What is done with finished steps, whatever integrator made them: objectives, gradients, dense output.
+"""Objectives, their gradients and the motion between steps, from finished steps of whatever integrator.
 
-`evaluate_responses` and `dense` are compiled entries (see `integrators.driver`): the packed model; tables, room and
-limits of the method; its tag.
+`evaluate_responses` and `dense` are compiled entries. They take the packed model; tables, the history of steps and its
+sizes (`integrators.driver`); and the tag of the method.
 """
 
 import math

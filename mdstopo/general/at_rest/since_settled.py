@@ -1,7 +1,7 @@
 """Displacements that count from where a scene has settled: `since: settled`.
 
 Such a response is g = e . (u(q) - u(q0)), with u the displacement of its point along the observer's axes, q0 the start
-at rest, and e an axis, or the direction of what is in parentheses where its norm is meant. Kernels know u(q0) as
+at rest, and e an axis, or the direction of u(q) - u(q0) where its norm is meant. Kernels know u(q0) as
 numbers of the response (`GeneralModel.response_par`), and differentiate with these held. What they leave out is
 -e . du/dq (q0), a cotangent of the start's positions, which `start.SettledStart` pulls through the equilibrium.
 """

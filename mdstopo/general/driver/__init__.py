@@ -1,1 +1,1 @@
-"""What Python does with a compiled scene: evaluate, refine peaks, differentiate, settle, price, say who is to blame."""
+"""What Python does with a compiled scene: evaluate it, differentiate, price candidates, tell why a run ended early."""

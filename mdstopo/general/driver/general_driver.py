@@ -1,4 +1,4 @@
-"""From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
+"""One compiled general scene, ready to run: its arrays, calls of the compiled entries, and what they find."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Members switch, and the history of steps notes it as events."""
+"""What happens where members switch: their modes change, and the history of steps gets an event for each."""
 
 import numpy as np
 

@@ -45,14 +45,13 @@ from mdstopo.general.events.permanent_sets import begins_divided
 from mdstopo.general.integrators.braking import HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.steps.first_step import first_step, motion_scale
 from mdstopo.general.steps.method_interface import UNSOLVED, is_explicit, make_stages, scheme, step_error
-from mdstopo.general.steps.run_start import ROUNDING, log_start, motion_at_start, scene_size, start_modes
+from mdstopo.general.steps.run_start import ROUNDING, log_start, modes_at_start, motion_at_start, scene_size
 from mdstopo.general.steps.step_history import (
     EVENTS,
     FIRST,
-    PARENT,
-    SEGMENT,
     copy_vector,
     keep_state,
+    keep_step,
 )
 from mdstopo.integrators.runge_kutta_tables import INSIDE
 from mdstopo.integrators.springs_runge_kutta import MOST
@@ -294,7 +293,7 @@ def run_adaptive(
         moving[d] = model.mass[d] if model.free[d] != 0 else 0.0
     measures = explicit and method == 1 and not fixed_step > 0.0
     if switching:
-        singular = start_modes(model, member_state, workspace, q0, v0, a0, lam, np.bool_(True))
+        singular = modes_at_start(model, member_state, workspace, q0, v0, a0, lam, np.bool_(True))
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t
@@ -535,7 +534,6 @@ def run_adaptive(
             if where[1] < 0 and may_meet(shortest, motion):
                 relative_pose(model, q0, v0, before)
                 where[1] = meeting(model, segment, t, member_state, before, rel)
-            happened = events
             ended = h if measures and own == s and not happens else 0.0
             t = end if lands else t + h
             if happens or t >= ahead:
@@ -544,13 +542,9 @@ def run_adaptive(
             longest = max(longest, h)
             copy_vector(end_q, q0)
             copy_vector(end_v, v0)
-            history.index[count, PARENT] = count - 1
-            history.index[count, SEGMENT] = segment
-            history.index[count, EVENTS] = happened
             stages += own
+            keep_step(history, count, segment, events, stages, t, q0, v0, push)
             count += 1
-            history.index[count, FIRST] = stages
-            keep_state(history, count, t, q0, v0, push[0], push[1])
             work[ACCEPTED] += 1
             if happens:
                 solve_accelerations(model, member_state, segment, t, q0, v0, no, workspace, a0, lam)

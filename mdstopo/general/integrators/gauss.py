@@ -22,6 +22,7 @@ from mdstopo.general.integrators.gauss_window import (
     balance_nodes,
     is_coupled,
     keep_nodes,
+    level_of,
     make_nodes,
     moving,
     solve_nodes,
@@ -31,7 +32,7 @@ from mdstopo.general.integrators.generalized_alpha_step import rate_of
 from mdstopo.general.model.general_model import ENERGY, KIND, unpack_general
 from mdstopo.general.steps.first_step import motion_scale
 from mdstopo.general.steps.run_start import motion_at_start
-from mdstopo.general.steps.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, copy_vector, keep_state
+from mdstopo.general.steps.step_history import EVENTS, FIRST, carve_history, copy_vector, keep_state, keep_step
 from mdstopo.integrators.driver import LOOSE_NEWTON, NEWTON_TOLERANCE
 from mdstopo.integrators.rows import integrate_to_nodes, take_rows
 from mdstopo.integrators.springs_gauss import FIRST_LEVEL, LONGEST, caution
@@ -266,7 +267,7 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     weight = rows[0]
     end = rows[1:3]
     weights = np.empty(model.mass.shape[0])
-    lam = np.zeros(model.size[0])
+    push = np.zeros((2, model.size[0]))  # no joints hold windows
     poses = np.empty((3, n_pair, pose_size(model)))
     rel0 = poses[0]
     before = poses[1]
@@ -305,7 +306,7 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     wanted = fixed_step
     if not fixed_step > 0.0:
         wanted = min(span, LONGEST / max(rate_of(model, workspace), 1e-300), TURN / max(widest_turn(model, v0), 1e-300))
-    keep_state(history, 0, t, q0, v0, lam, lam)
+    keep_state(history, 0, t, q0, v0, push[0], push[1])
     history.index[0, FIRST] = 0
     count = np.int64(0)
     stages = np.int64(0)
@@ -341,10 +342,7 @@ def windows(model, tables, member_state, settings, most, history, work, where):
                     return code, count, t
                 wanted = min(estimate, 0.5 * h)
                 continue
-            level = 0
-            while COUNTS[level] != s:
-                level += 1
-            planes = tables[level]
+            planes = tables[level_of(s)]
             keep_nodes(model, q0, s, t, h, planes, history, stages, nodes)
             finite = _end_of_window(model, planes, s, h, nodes, end)
             window_state(model, q0, end[0], end[1], q0, v0)
@@ -358,14 +356,10 @@ def windows(model, tables, member_state, settings, most, history, work, where):
             copy_vector(after.reshape(after.size), before.reshape(before.size))
             t = stop if lands else t + h
             longest = max(longest, h)
-            history.index[count, PARENT] = count - 1
-            history.index[count, SEGMENT] = segment
-            history.index[count, EVENTS] = 0
             stages += s
+            keep_step(history, count, segment, np.int64(0), stages, t, q0, v0, push)
             count += 1
-            history.index[count, FIRST] = stages
             history.index[count, EVENTS] = 0
-            keep_state(history, count, t, q0, v0, lam, lam)
             work[ACCEPTED] += 1
             if not fixed_step > 0.0:
                 change = 0.9 * (tolerance / max(estimate, 1e-30)) ** (1.0 / (s + 1)) * 11.0 / s

@@ -1,4 +1,4 @@
-"""What is Gauss collocation's own of the entries for general scenes (`entries`)."""
+"""The tag and the compiled `simulate` of Gauss collocation, for `driver.entries`."""
 
 import mdstopo.general.integrators.gauss_sensitivity  # noqa: F401  (enters the method's functions)
 from mdstopo.general.integrators.gauss import TAG, simulate

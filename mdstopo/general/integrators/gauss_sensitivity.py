@@ -10,13 +10,13 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.dynamics.accelerations import accelerations_jvp, matrices_vjp, turns_vjp
 from mdstopo.general.integrators.gauss import TAG
 from mdstopo.general.integrators.gauss_window import (
-    COUNTS,
     DENSE,
     add_changes,
     add_rate_products,
     fill_slopes,
     has_rates,
     is_coupled,
+    level_of,
     moving,
     pull_changes,
 )
@@ -54,15 +54,6 @@ def stages_of(history, w):
     """First stage of window w, number of its nodes, and its length (s)."""
     o = history.index[w, FIRST]
     return o, history.index[w + 1, FIRST] - o, history.t[w + 1] - history.t[w]
-
-
-@part
-def level_of(s):
-    """The place of a window's number of nodes s in `COUNTS`."""
-    level = 0
-    while COUNTS[level] != s:
-        level += 1
-    return level
 
 
 @kernel

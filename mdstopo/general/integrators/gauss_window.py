@@ -89,6 +89,15 @@ bundle(Nodes, FIELDS)
 
 
 @part
+def level_of(s):
+    """The place of a window's number of nodes s in `COUNTS`."""
+    level = 0
+    while COUNTS[level] != s:
+        level += 1
+    return level
+
+
+@part
 def moving(model):
     """The number of freedoms of all bodies but ground, which is the last one."""
     return model.mass.shape[0] - freedoms(model)

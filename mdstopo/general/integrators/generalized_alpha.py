@@ -34,15 +34,14 @@ from mdstopo.general.events.locate import (
 from mdstopo.general.events.permanent_sets import begins_divided
 from mdstopo.general.integrators.generalized_alpha_step import AUXILIARY, VELOCITY, advance, make_step_room, rate_of
 from mdstopo.general.model.general_model import unpack_general
-from mdstopo.general.steps.run_start import ROUNDING, log_start, motion_at_start, scene_size, start_modes
+from mdstopo.general.steps.run_start import ROUNDING, log_start, modes_at_start, motion_at_start, scene_size
 from mdstopo.general.steps.step_history import (
     EVENTS,
     FIRST,
-    PARENT,
-    SEGMENT,
     carve_history,
     copy_vector,
     keep_state,
+    keep_step,
 )
 from mdstopo.integrators.springs_generalized_alpha import FEWEST
 from mdstopo.integrators.steps import (
@@ -140,7 +139,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     watched = room_for_watched(model)
     watch_all(model, np.int64(0), watched)
     if switching:
-        singular = start_modes(model, member_state, workspace, q, v, a0, lam, no)
+        singular = modes_at_start(model, member_state, workspace, q, v, a0, lam, no)
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t
@@ -331,13 +330,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     guess[2, d] = ends[AUXILIARY, d] - 3.0 * slope
             copy_vector(end_q, q)
             copy_rows(ends, state)
-            history.index[count, PARENT] = count - 1
-            history.index[count, SEGMENT] = segment
-            history.index[count, EVENTS] = events
             stages += used
+            keep_step(history, count, segment, events, stages, t, q, v, push)
             count += 1
-            history.index[count, FIRST] = stages
-            keep_state(history, count, t, q, v, push[0], push[1])
             work[ACCEPTED] += 1
             if happens:
                 solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a0, lam)

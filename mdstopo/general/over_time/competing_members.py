@@ -9,9 +9,10 @@ import numpy as np
 
 from mdstopo.case.over_time import ReductionKind
 from mdstopo.general.driver_interface import DriverWithRun
-from mdstopo.general.model.general_model import COUNT, GROUP, MEMBER_FORCE, OFFSET, SUBJECT
+from mdstopo.general.model.general_model import MEMBER_FORCE, SUBJECT
 from mdstopo.general.peaks.peak_search import ALIKE, EVEN, MARGIN
 from mdstopo.general.responses.extremes import FRACTIONS, row_of
+from mdstopo.general.responses.general_responses import members_of
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: members that are followed at most, unless more rows than these are asked for
@@ -45,7 +46,7 @@ def members_peaks(
     ends = driver.steps_are_fine  # then samples inside steps are needed here and there only
     fractions = np.array([0.0, 1.0] if ends else FRACTIONS)
     places = np.array([[count - 1.0, 1.0]]) if final else _places(np.arange(count), fractions)
-    members = np.arange(members_of(driver, j))
+    members = np.arange(members_behind(driver, j))
     at_once = not final and len(members) * len(places) <= AT_ONCE
     nobody = np.zeros(0, dtype=np.int64)
     top, seen_all = compare(driver, j, places, members if at_once else nobody, count)
@@ -153,7 +154,7 @@ def compare(
 
     Returns (members of the group,) and (C, K, 2).
     """
-    top, seen = np.zeros(members_of(driver, j)), np.zeros((len(who), len(places), 2))
+    top, seen = np.zeros(members_behind(driver, j)), np.zeros((len(who), len(places), 2))
     driver.entry.compare(
         driver.entry.TAG, driver.ints, driver.floats, driver.method.tables, driver.limits, count, driver.room,
         driver.room_ints, driver.member_state, exact, j, places, who, top, seen, driver.work,
@@ -161,8 +162,7 @@ def compare(
     return top, seen
 
 
-def members_of(driver: DriverWithRun, j: int) -> int:
+def members_behind(driver: DriverWithRun, j: int) -> int:
     """How many members the group has whose forces response j is."""
-    block = driver.scene.model.block
-    own = block[block[:, GROUP] == driver.scene.model.response[j, SUBJECT]]
-    return int((own[:, OFFSET] + own[:, COUNT]).max())
+    model = driver.scene.model
+    return int(members_of.py_func(model, model.response[j, SUBJECT]))  # type: ignore[attr-defined]

@@ -2,10 +2,10 @@
 
 A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
 first sampled, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
-derivatives bend more sharply than values; for values see `quadrature_breakpoints`). The
-integrand is continuous there, so that its derivatives need no term of their own. They jump there, and at the end of a
-step beside a norm's zero they belong to a vector that all but vanishes: what the last stages of a long step are off by,
-which is more than the step is, would turn it anywhere. Steps beside a zero are therefore short (`BESIDE`).
+derivatives bend more sharply than values; for values see `quadrature_breakpoints`). The integrand is continuous at a
+kink, so its time adds no term to the derivative of the integral. Beside a norm's zero the derivative is along a vector
+that all but vanishes, and the last stages of a long step have an error that would turn this vector anywhere. Steps
+beside a zero are therefore short (`BESIDE`).
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""Which member of a group leads, that is carries the largest force, when: crossings of forces to the last digit.
+"""Which member of a group leads, that is carries the largest force, and from when to when.
 
 In every step each member's force f*(t) is smooth. |f_a| = |f_b| where f_a - f_b or f_a + f_b vanishes: smooth functions
 both, whose roots are looked for between samples so near together that a cubic through values and rates tells all but
-the narrowest leads; where it does not tell, the motion itself is sampled. Only members come into question that may
-lead between two samples by a bound on their cubics. Forces that are the same at all samples of a step (laws of time
+the narrowest leads; where it does not tell, the motion itself is sampled. Only those members are compared that a bound
+on their cubics lets lead between two samples. Forces that are the same at all samples of a step (laws of time
 alone, actuators at their limit, symmetry) do not cross between them.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import KIND, MEMBER_FORCE
-from mdstopo.general.over_time.competing_members import compare, members_of
+from mdstopo.general.over_time.competing_members import compare, members_behind
 from mdstopo.general.responses.extremes import FRACTIONS
 from mdstopo.general.responses.general_responses import TIE
 from mdstopo.general.responses.sampled_roots import roots_between
@@ -48,7 +48,7 @@ class Lead(NamedTuple):
 def leads(driver: DriverWithRun, j: int, t: FloatArray) -> list[Lead]:
     """The members that carry the largest force of response j one after the other, in order of time; t (m + 1,): the
     steps' times."""
-    count, members = len(t) - 1, members_of(driver, j)
+    count, members = len(t) - 1, members_behind(driver, j)
     found: list[Lead] = []
     if members == 1:
         return [Lead(w, 0.0, 1.0, 0) for w in range(count)]
@@ -77,7 +77,7 @@ def changes(leads_of: list[Lead], t: FloatArray) -> list[float]:
 
 def is_led(driver: DriverWithRun, j: int) -> bool:
     """Whether response j is the largest of the forces of several members."""
-    return bool(driver.scene.model.response[j, KIND] == MEMBER_FORCE) and members_of(driver, j) > 1
+    return bool(driver.scene.model.response[j, KIND] == MEMBER_FORCE) and members_behind(driver, j) > 1
 
 
 def _forces(

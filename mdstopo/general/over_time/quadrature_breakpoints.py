@@ -4,9 +4,9 @@ The integral of a response is that of one more coordinate, by the weights of the
 it. A norm or an absolute value has a complex singularity as near to the real axis as it comes to zero, however smooth
 the motion is; the nearer it is, the shorter steps beside it have to be. And a driven body, or one that hardly feels its
 members, takes steps in which a smooth response is no polynomial. So the weights' sum over each step is compared
-with a Gauss-Legendre sum, on the quintic through the step's ends, and steps are halved until both agree. What halves
-them is landed on; since steps are chosen anew in between, that is checked once more. Fixed steps promise nothing, and
-stay.
+with a Gauss-Legendre sum, on the quintic through the step's ends, and steps are halved until both agree. The motion is
+computed once more with steps that end at these middles; since steps between them are chosen anew, all is checked again.
+Steps of fixed length promise no accuracy, and stay as they are.
 """
 
 from collections.abc import Callable
@@ -20,6 +20,7 @@ from mdstopo.general.scene.extent import size_of
 from mdstopo.general.steps.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
+from mdstopo.scene.signal_segments import APART
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than a method's own weights; than collocation's, too
@@ -36,8 +37,6 @@ SHARE = 1e-3
 HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
 #: places and angles below this share of the scene's size, or of a radian, are rounding
 NOUGHT = 1e-12
-#: steps nearer together than this share of the simulated time are one
-APART = 1e-10
 
 #: places (K, 2), and between which two ends each is (K,) -> values (K,)
 Integrand = Callable[[FloatArray, IndexArray], FloatArray]

@@ -1,4 +1,4 @@
-"""When the switches of an expression change their sides: where their margins vanish, to the last digit."""
+"""When the switches of an expression change their sides: the times at which their margins vanish."""
 
 import numpy as np
 

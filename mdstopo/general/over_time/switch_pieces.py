@@ -1,4 +1,4 @@
-"""Expressions of responses with kinks and jumps: where in time their switches change, and what that does to peaks.
+"""Expressions of responses with kinks and jumps: what changes of their switches do to peaks and integrals over time.
 
 Between two changes an expression is smooth. A peak where a switch with the margin m changes sides, at the time t_s,
 varies with it, whether the expression has a kink there or jumps:

@@ -1,1 +1,1 @@
-"""States and responses anywhere on the method's own motion; peaks of responses, and their gradients."""
+"""States and responses anywhere on the method's own motion; peaks of responses; rows with their gradients."""

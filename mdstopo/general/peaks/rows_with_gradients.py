@@ -1,8 +1,7 @@
-"""The rows of one response, its peaks or its value at the end, with their gradients in one call: all that most
-evaluations need.
+"""The rows of one response with their gradients in one call: all that most evaluations need.
 
-It does what `peak_search.peaks_of_steps`, or `dense_output.sample_response` at the end, and then `row_sweep.rows_vjp`
-of the rows that were found do.
+Rows are its peaks, or its value at the end. The call does what `peak_search.peaks_of_steps`, or
+`dense_output.sample_response` at the end, and then `row_sweep.rows_vjp` of the rows that were found do.
 """
 
 import numpy as np

@@ -24,8 +24,9 @@ from mdstopo.general.model.priced_candidates import (
     unpack_candidates,
 )
 from mdstopo.general.pricing.loaded_members import load_members
+from mdstopo.general.pricing.priced_tile import make_lists
 from mdstopo.general.pricing.switching_prices import ROW, make_following, price_followed
-from mdstopo.general.pricing.tile_prices import make_lists, price_run
+from mdstopo.general.pricing.tile_prices import price_run
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     has_spring_energies,
     member_designs,
@@ -162,7 +163,7 @@ def _price_by_modes(model, candidates, grids, i, j, error, scratch, lists, price
     """The prices of a tile where laws have modes: those of each of these laws, and of all others.
 
     model, candidates, grids, i, j, error, scratch, price: as of `_price_tile`.
-    lists: of `tile_prices.make_lists`.
+    lists: of `priced_tile.make_lists`.
 
     Returns how many prices were computed, of a law as parts of one.
     """

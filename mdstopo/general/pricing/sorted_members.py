@@ -8,10 +8,13 @@ Which class a member is in is not told from others: each is looked at at the nod
 followed by itself (`switching_prices.price_step`).
 """
 
+from typing import Any
+
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, larger, load, negative, zero
+from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODE, NODES
 from mdstopo.general.pricing.certain_modes import NARROW, UNSURE
@@ -49,12 +52,29 @@ AT_ZERO, BY_ELONGATION, BY_RATE = range(TANGENT_NUMBERS)
 SURE = 1e-11
 
 
+#: the arrays of a `Sorting`
+FIELDS = ("kind", "classes", "places", "mode", "works", "unsorted", "tried", "tangent")
+
+
+class Sorting:
+    """What sorting a tile needs, inside kernels.
+
+    kind (PLACES,): the class of each member. classes (CLASSES, CLASS_NUMBERS): what is known of each. places (PLACES,):
+    places of some members. mode (NODES,): of all members of a part at the nodes of a step. works (NODES, WORKS, MANY):
+    what members do there. unsorted: 1 for each of the narrowest parts that is not sorted. tried (TRIED,), tangent:
+    modes in which members may stay, and the tangents of their margins.
+    """
+
+    def __init__(self, *_arrays: Any) -> None: ...
+
+
+bundle(Sorting, FIELDS)
+
+
 @kernel
 def make_sorting():
-    """What sorting a tile needs: the class of each member, what is known of the classes, places of some members, modes
-    of all members of a part at the nodes of a step, what members do there, which parts are not sorted; modes in which
-    members may stay, and the tangents of their margins."""
-    return (
+    """The arrays that sorting takes."""
+    return Sorting(
         np.zeros(PLACES, np.int64),
         np.zeros((CLASSES, CLASS_NUMBERS), np.int64),
         np.zeros(PLACES, np.int64),
@@ -116,10 +136,10 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
       known: whether it is known in which modes they begin.
       begin, kept (PLACES,): these, and their permanent sets (m); of a law that does not remember, zeros.
     In place:
-      sorting: of `make_sorting`: with the modes of all members at nodes, UNSURE where the members are to be looked at,
+      sorting: a `Sorting`: with the modes of all members at nodes, UNSURE where the members are to be looked at,
         who are overwritten there; classes of the members are set, and added to those that there are.
     """
-    kind, classes, _, mode, works, _, tried, _ = sorting
+    kind, classes, mode, works, tried = sorting.kind, sorting.classes, sorting.mode, sorting.works, sorting.tried
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     lo = PLACES + first * TALL
@@ -170,11 +190,11 @@ def _fill_tried(code, p, curves, t, first, size, known, begin, sorting):
 
     code, p (8,), curves, t: the law, numbers of all laws, and any time (s), on which the law does not depend.
     first, size, known, begin: as of `sort_members`.
-    sorting: of `make_sorting`, with what the members do; the modes and the tangents are set.
+    sorting: a `Sorting`, with what the members do; the modes and the tangents are set.
 
     Returns how many modes there are; 0 where bounds tell the modes at all nodes, so that no range is known.
     """
-    _, _, _, mode, works, _, tried, tangent = sorting
+    mode, works, tried, tangent = sorting.mode, sorting.works, sorting.tried, sorting.tangent
     box = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for m in range(NODES):
         if mode[m] == UNSURE:
@@ -214,9 +234,9 @@ def _stay_in(n, i, sorting):
     """A bit for each member of a vector of them that stays in a mode.
 
     n, i: the number of the mode among those that were filled, and of the first member.
-    sorting: of `make_sorting`.
+    sorting: a `Sorting`.
     """
-    _, _, _, mode, works, _, tried, tangent = sorting
+    mode, works, tried, tangent = sorting.mode, sorting.works, sorting.tried, sorting.tangent
     own = tangent[n]
     bits = (1 << lanes()) - 1
     for m in range(NODES):

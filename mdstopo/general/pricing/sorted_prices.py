@@ -13,6 +13,7 @@ from mdstopo.compiler.vector import WIDE
 from mdstopo.general.model.priced_candidates import CODE, FIRST_STAGE, KIND, LAST_STAGE, MOVES, WHOLE
 from mdstopo.general.pricing.certain_modes import BOUND_LEVELS, NARROW, UNSURE, modes_at_nodes
 from mdstopo.general.pricing.loaded_members import add_states, load_all, load_members, take_members
+from mdstopo.general.pricing.priced_tile import LOADED
 from mdstopo.general.pricing.sorted_members import (
     CLASSES,
     COUNT,
@@ -31,11 +32,9 @@ from mdstopo.sensitivity.tile_interpolation import (
     DONE,
     LEVEL,
     LEVELS,
-    PARTS,
     PRICED,
     SHORT,
     begin_part,
-    extent,
     next_candidates,
     number_candidates,
     take_prices,
@@ -50,74 +49,63 @@ SHARE_OF_A_CLASS = 0.25
 PAID = -2
 #: the level of columns that are no part of a tile with bounds
 NO_LEVEL = -1
-#: place behind those of the smallest parts: whether all members of the tile are in the model
-LOADED = PARTS
 
 
 @kernel
-def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile, buffers, price):
+def price_part(tile, s, level, first, size, smooth, begun):
     """Price the members of some columns of a tile in a step.
 
     In:
-      model, candidates, k: as of `tile_prices.price_run`, of a law whose members are followed.
+      tile: a `priced_tile.PricedTile`, by a law whose members are followed. Of a law that remembers the modes behind
+        the step are set, in row 0 behind a whole step, else in row 1, and the permanent sets behind it in `fresh`.
       s: the number of the step.
       level, first, size: of the part, its first column, and how many it has; NO_LEVEL: its members are looked at one by
         one.
       smooth: whether some members may be computed from others.
       begun: whether members of a law that remembers are in modes.
-      tile: grids, i, j and error as of `tile_interpolation.take_prices`.
-    In place:
-      buffers: of `tile_prices.price_run`; of a law that remembers the modes behind the step are set, in row 0 behind a
-        whole step, else in row 1, and the permanent sets behind it in `fresh`.
-      price (PLACES,): added to.
 
     Returns how many prices of steps were computed.
     """
-    grids, i, j, _ = tile
-    _, lists, _, _, sorting, _ = buffers
-    modes, sets, todo, whole = lists[4], lists[5], lists[6], lists[9]
-    kind, classes, places, mode = sorting[0], sorting[1], sorting[2], sorting[3]
+    model, candidates, k, lists, sorting = tile.model, tile.candidates, tile.k, tile.lists, tile.sorting
+    classes, places = sorting.classes, sorting.places
     code = candidates.run[k, CODE]
-    height, _ = extent(grids, i, j)
-    if todo[LOADED] == 0:
-        load_all(model, candidates, k, grids, i, j, whole)
-        todo[LOADED] = 1
+    if lists.todo[LOADED] == 0:
+        load_all(model, candidates, k, tile.grids, tile.i, tile.j, lists.whole)
+        lists.todo[LOADED] = 1
     classes[:] = 0
     if level != NO_LEVEL:
-        _sort_part(model, candidates, k, s, level, first, height, buffers)
+        _sort_part(tile, s, level, first)
     else:
-        mode[:] = UNSURE
+        sorting.mode[:] = UNSURE
         known = law_remembers(code) and begun
-        sort_members(model, candidates, k, s, first, size, height, known, modes[0], sets[0], sorting)
+        sort_members(model, candidates, k, s, first, size, tile.height, known, lists.modes[0], lists.sets[0], sorting)
     to = np.int64(0) if candidates.step[s, KIND] == WHOLE else np.int64(1)
     done = 0.0
     for c in range(CLASSES):
         stays = classes[c, FROM] == classes[c, TO]
         if stays and smooth and classes[c, COUNT] > FEW and not law_is_idle(code, classes[c, FROM]):
-            done += _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price)
+            done += _price_by_few(tile, s, level, first, c)
         if classes[c, COUNT] > 0 and (stays or is_quick(code, candidates.law[k], model.curves)):
-            done += _price_each(model, candidates, k, s, first, size, c, height, to, tile[3], buffers, price)
+            done += _price_each(tile, s, first, size, c, to)
         else:
-            for m in range(_places_of(kind, c, first, size, height, places)):
-                kind[places[m]] = UNSORTED
-    return done + _follow_others(model, candidates, k, s, first, size, begun, height, to, buffers, price)
+            for m in range(_list_places(tile, c, first, size)):
+                sorting.kind[places[m]] = UNSORTED
+    return done + _follow_others(tile, s, first, size, begun, to)
 
 
 @kernel
-def _places_of(kind, c, first, size, height, places):
+def _list_places(tile, c, first, size):
     """List the members of a class in some columns of a tile, row by row.
 
-    In:
-      kind (PLACES,): the class of each member.
-      c: the class, or UNSORTED.
-      first, size, height: the first column, how many there are, and how many rows.
-    Out:
-      places (PLACES,): the places of these members in the tile come first.
+    tile: a `PricedTile`, whose `sorting.places` begin with the places of these members then.
+    c: the class, or UNSORTED.
+    first, size: the first column, and how many there are.
 
     Returns how many there are.
     """
+    kind, places = tile.sorting.kind, tile.sorting.places
     count = np.int64(0)
-    for a in range(height):
+    for a in range(tile.height):
         for b in range(a * BROAD + first, a * BROAD + first + size):
             if kind[b] == c:
                 places[count] = b
@@ -126,17 +114,14 @@ def _places_of(kind, c, first, size, height, places):
 
 
 @kernel
-def _sort_part(model, candidates, k, s, level, first, height, buffers):
+def _sort_part(tile, s, level, first):
     """Sort the members of a part by a law that does not remember: those of its halves, and so on, by bounds, and where
     these do not tell member by member.
 
-    model, candidates, k, s, level, first: as of `price_part`.
-    height: rows of the tile.
-    buffers: of `tile_prices.price_run`, of which the sorting is filled.
+    tile, s, level, first: as of `price_part`. The tile's sorting is filled.
     """
-    _, lists, spans, _, sorting, _ = buffers
-    modes, sets = lists[4], lists[5]
-    kind, classes, mode, unsorted = sorting[0], sorting[1], sorting[3], sorting[5]
+    model, candidates, k, lists, sorting = tile.model, tile.candidates, tile.k, tile.lists, tile.sorting
+    height, unsorted = tile.height, sorting.unsorted
     begin = first // NARROW
     behind = begin + (BROAD >> level) // NARROW
     unsorted[begin:behind] = 1
@@ -146,74 +131,73 @@ def _sort_part(model, candidates, k, s, level, first, height, buffers):
             if unsorted[narrow] == 0:
                 continue
             at = narrow * NARROW
-            modes_at_nodes(model, candidates, k, s, (1 << inner) - 1 + at // size, spans, mode)
-            old, new = modes_of_all(mode)
+            modes_at_nodes(model, candidates, k, s, (1 << inner) - 1 + at // size, tile.spans, sorting.mode)
+            old, new = modes_of_all(sorting.mode)
             if old == UNSURE and size > NARROW:
                 continue
             unsorted[narrow : narrow + size // NARROW] = 0
             if old != UNSURE:
-                own = join_class(old, new, height * size, classes)
+                own = join_class(old, new, height * size, sorting.classes)
                 for a in range(height):
-                    kind[a * BROAD + at : a * BROAD + at + size] = own
+                    sorting.kind[a * BROAD + at : a * BROAD + at + size] = own
                 continue
-            sort_members(model, candidates, k, s, at, size, height, np.bool_(False), modes[0], sets[0], sorting)
+            sort_members(
+                model, candidates, k, s, at, size, height, np.bool_(False), lists.modes[0], lists.sets[0], sorting
+            )
 
 
 @kernel
-def _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price):
+def _price_by_few(tile, s, level, first, c):
     """Price the members of a part that stay in a mode from those of few of the part.
 
-    model, candidates, k, s, level, first, tile, buffers, price: as of `price_part`.
+    tile, s, level, first: as of `price_part`.
     c: the class. Members that have their prices are PAID then.
 
     Returns how many prices were computed.
     """
-    grids, i, j, error = tile
-    scratch, lists, _, following, sorting, _ = buffers
-    found, works = lists[7], lists[10]
+    model, candidates, k, i, j = tile.model, tile.candidates, tile.k, tile.i, tile.j
+    scratch, sorting, found = tile.scratch, tile.sorting, tile.lists.found
     plan, part_level, _, _, index, values, _ = scratch
-    kind, classes, places = sorting[0], sorting[1], sorting[2]
     step = candidates.step[s]
-    height, _ = extent(grids, i, j)
+    mode = sorting.classes[c, FROM]
     found[1, 0] = 0.0
     begin_part(level, first, scratch)
-    while next_candidates(grids, i, j, scratch) and plan[LEVEL] < LEVELS:
+    while next_candidates(tile.grids, i, j, scratch) and plan[LEVEL] < LEVELS:
         members = number_candidates(i, j, scratch)
         load_members(model, candidates, k, index, members, np.int64(0))
         values[:members] = 0.0
         add_states(
-            model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], members, classes[c, FROM], found[1, :1], works,
-            following, values,
+            model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], members, mode, found[1, :1], tile.lists.works,
+            tile.following, values,
         )  # fmt: skip
-        take_prices(grids, i, j, error * SHARE_OF_A_CLASS, scratch, found[0])
-    for m in range(_places_of(kind, c, first, BROAD >> level, height, places)):
-        b = places[m]
+        take_prices(tile.grids, i, j, tile.error * SHARE_OF_A_CLASS, scratch, found[0])
+    for m in range(_list_places(tile, c, first, BROAD >> level)):
+        b = sorting.places[m]
         if part_level[b % BROAD // SHORT] == DONE:
-            price[b] += found[0, b]
-            kind[b] = PAID
+            tile.price[b] += found[0, b]
+            sorting.kind[b] = PAID
     return 1.0 * plan[PRICED]
 
 
 @kernel
-def _price_each(model, candidates, k, s, first, size, c, height, to, error, buffers, price):
+def _price_each(tile, s, first, size, c, to):
     """Price the members of a class one by one, in vectors. Those for which that does not do are UNSORTED then.
 
-    model, candidates, k, s, first, size, buffers, price: as of `price_part`.
+    tile, s, first, size: as of `price_part`.
     c: the class.
-    height: rows of the tile.
     to: the row for modes behind the step.
-    error: by which a price may be off.
 
     Returns how many prices were computed.
     """
-    scratch, lists, _, following, sorting, switching = buffers
-    modes, sets, found, fresh, works = lists[4], lists[5], lists[7], lists[8], lists[10]
-    kind, classes, places = sorting[0], sorting[1], sorting[2]
-    values = scratch[5]
+    model, candidates, k, price, lists = tile.model, tile.candidates, tile.k, tile.price, tile.lists
+    modes, sets, found, fresh = lists.modes, lists.sets, lists.found, lists.fresh
+    kind, classes, places = tile.sorting.kind, tile.sorting.classes, tile.sorting.places
+    switching = tile.switching
+    values = tile.scratch[5]
     step = candidates.step[s]
     old = classes[c, FROM]
     new = classes[c, TO]
-    count = _places_of(kind, c, first, size, height, places)
+    count = _list_places(tile, c, first, size)
     for m in range(count):
         fresh[places[m]] = sets[0, places[m]]
     if old != new:
@@ -222,7 +206,7 @@ def _price_each(model, candidates, k, s, first, size, c, height, to, error, buff
             for m in range(wide):
                 switching[5][0, m] = sets[0, places[at + m]]
             take_members(model, places[at : at + wide], wide, np.int64(TOGETHER))
-            price_switched(model, candidates, k, wide, s, old, new, error, switching)
+            price_switched(model, candidates, k, wide, s, old, new, tile.error, switching)
             for m in range(wide):
                 b = places[at + m]
                 fresh[b] = switching[5][1, m]
@@ -241,27 +225,29 @@ def _price_each(model, candidates, k, s, first, size, c, height, to, error, buff
     take_members(model, places, count, behind)
     values[:behind] = 0.0
     kept = found[1, :count] if law_remembers(candidates.run[k, CODE]) else found[1, :1]
-    add_states(model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], count, old, kept, works, following, values)
+    add_states(
+        model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], count, old, kept, lists.works, tile.following, values
+    )
     for m in range(count):
         price[places[m]] += values[m]
     return 1.0 * count
 
 
 @kernel
-def _follow_others(model, candidates, k, s, first, size, begun, height, to, buffers, price):
+def _follow_others(tile, s, first, size, begun, to):
     """Follow those members that are in no class.
 
-    model, candidates, k, s, first, size, begun, buffers, price: as of `price_part`.
-    height, to: as of `_price_each`.
+    tile, s, first, size, begun: as of `price_part`.
+    to: as of `_price_each`.
 
     Returns how many these are.
     """
-    _, lists, _, following, sorting, _ = buffers
-    modes, sets, fresh = lists[4], lists[5], lists[8]
-    kind, places = sorting[0], sorting[2]
+    model, candidates, k, price, following = tile.model, tile.candidates, tile.k, tile.price, tile.following
+    modes, sets, fresh = tile.lists.modes, tile.lists.sets, tile.lists.fresh
+    places = tile.sorting.places
     yes = np.bool_(True)
     few = np.zeros(ROW)
-    count = _places_of(kind, np.int64(UNSORTED), first, size, height, places)
+    count = _list_places(tile, np.int64(UNSORTED), first, size)
     for at in range(0, count, ROW):
         wide = min(ROW, count - at)
         take_members(model, places[at : at + wide], wide, np.int64(ROW))

@@ -30,13 +30,13 @@ from mdstopo.general.model.priced_candidates import (
     SCENE,
     WHOLE,
 )
-from mdstopo.general.pricing.certain_modes import LEAVES, UNSURE, fill_spans, make_spans, modes_at_nodes, modes_in_step
+from mdstopo.general.pricing.certain_modes import LEAVES, UNSURE, fill_spans, modes_at_nodes, modes_in_step
 from mdstopo.general.pricing.loaded_members import add_states, load_all, load_members, loaded_at
-from mdstopo.general.pricing.sorted_members import make_sorting, modes_of_all
-from mdstopo.general.pricing.sorted_prices import LOADED, NO_LEVEL, price_part
-from mdstopo.general.pricing.switching_prices import ROW, add_pieces, make_following, price_point, price_step
-from mdstopo.general.pricing.switching_together import make_switching
-from mdstopo.mechanics.kinematics.kinematics_interface import WORKS, member_works
+from mdstopo.general.pricing.priced_tile import LEAST, LISTED_PARTS, LOADED, MOST, SAME, SETS, begin_pricing
+from mdstopo.general.pricing.sorted_members import modes_of_all
+from mdstopo.general.pricing.sorted_prices import NO_LEVEL, price_part
+from mdstopo.general.pricing.switching_prices import ROW, add_pieces, price_point, price_step
+from mdstopo.mechanics.kinematics.kinematics_interface import member_works
 from mdstopo.mechanics.laws.law_table import law_is_idle, law_remembers
 from mdstopo.sensitivity.tile_interpolation import (
     BROAD,
@@ -47,74 +47,33 @@ from mdstopo.sensitivity.tile_interpolation import (
     SHORT,
     TALL,
     begin_part,
-    extent,
     next_candidates,
     number_candidates,
     take_prices,
 )
 
-#: parts of a tile of all levels that have lists, of which those of a level begin at 2^level - 1
-LISTED_PARTS = 2**LEVELS - 1
-#: of each part: the mode that all its members are in, UNSURE where they differ; their least and largest permanent sets
-SHARED = 3
-SAME, LEAST, MOST = range(SHARED)
-#: sets at which a part whose members differ in these is priced
-SETS = 3
-
 
 @kernel
-def make_lists(candidates):
-    """What `price_run` needs of its own, for all runs of some candidates.
-
-    Returns numbers of steps, and what is known of each, by parts; how many these are; SHARED of parts; modes and
-    permanent sets, and behind a part of a step; which of the smallest parts are not listed, and whether members are
-    loaded; prices; what members of a step end with; all places of a tile; what members do at a state.
-    """
-    most = candidates.step.shape[0] + candidates.pose.shape[0] + 1
-    return (
-        np.zeros((LISTED_PARTS, most), np.int64),
-        np.zeros((LISTED_PARTS, most), np.int64),
-        np.zeros(LISTED_PARTS, np.int64),
-        np.zeros((LISTED_PARTS, SHARED)),
-        np.zeros((2, PLACES), np.int64),
-        np.zeros((2, PLACES)),
-        np.zeros(PARTS + 1, np.int64),
-        np.zeros((SETS, PLACES)),
-        np.zeros(PLACES),
-        np.zeros((2, PLACES), np.int64),
-        np.zeros((WORKS, PLACES)),
-    )
-
-
-@kernel
-def price_run(model, candidates, k, tile, scratch, lists, price):
+def price_run(model, candidates, k, place, scratch, lists, price):
     """Add what the members of a tile do by one law with modes.
 
     In:
       model: with room for 2 PLACES members, which are overwritten.
       candidates, k: a `PricedCandidates`, and the number of the run.
-      tile: grids, i, j and error as of `tile_interpolation.take_prices`.
+      place: the tile's grids, i, j and error, as of `tile_interpolation.take_prices`.
     In place:
       price (PLACES,): of its candidates.
     Scratch:
       scratch: of `tile_interpolation.make_scratch`.
-      lists: of `make_lists`.
+      lists: of `priced_tile.make_lists`.
 
     Returns how many prices were computed, of steps as parts of one.
     """
     run = candidates.run[k]
-    spans = make_spans(candidates.first.shape[1])
-    buffers = (scratch, lists, spans, make_following(), make_sorting(), make_switching())
-    _, i, j, _ = tile
-    _, _, count, shared, modes, sets, todo, _, _, _, _ = lists
+    tile = begin_pricing(model, candidates, k, place, scratch, lists, price)
     for n in range(candidates.curves.shape[1]):
         model.curves[n] = candidates.curves[run[SCENE], n]
-    fill_spans(candidates, k, i, j, spans)
-    count[:] = 0
-    modes[:] = 0
-    sets[:] = 0.0
-    shared[:] = 0.0
-    todo[LOADED] = 0
+    fill_spans(candidates, k, tile.i, tile.j, tile.spans)
     followed = run[MODES] == FOLLOWED
     steps = run[LAST_STEP] - run[FIRST_STEP] if followed else run[LAST_STATE] - run[FIRST_STATE]
     begun = np.bool_(False)
@@ -125,42 +84,35 @@ def price_run(model, candidates, k, tile, scratch, lists, price):
         if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, MOVES] == 0:
             continue
         if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
-            done += _price_sorted(model, candidates, k, u, tile, buffers, price)
+            done += _price_sorted(tile, u)
             continue
-        done += _price_next(model, candidates, k, u, begun, ends, tile, buffers, price)
+        done += _price_next(tile, u, begun, ends)
         if followed and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
             ends = np.int64(candidates.step[run[FIRST_STEP] + u, KIND] != WHOLE)
             begun = begun or ends == 0
     for part in range(LISTED_PARTS):
-        done += _price_list(model, candidates, k, part, tile, buffers, price)
+        done += _price_list(tile, part)
     return done / max(steps, 1)
 
 
 @kernel
-def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
+def _price_next(tile, u, begun, ends):
     """Go through a step: list it for the parts of which enough is known, and follow all other members.
 
-    In:
-      model, candidates, k, tile: as of `price_run`.
-      u: the step, as of `certain_modes.modes_in_step`.
-      begun: whether members are in modes.
-      ends: 1 where the last step was a part of one, and those of states alone are in `modes[1]`; else 0.
-    In place:
-      buffers: of `make_scratch`, `make_lists`, `make_spans`, `make_following`, `make_sorting` and `make_switching`, of
-        which the lists matter.
-      price (PLACES,): added to.
+    tile: a `PricedTile`.
+    u: the step, as of `certain_modes.modes_in_step`.
+    begun: whether members are in modes.
+    ends: 1 where the last step was a part of one, and those of states alone are in `modes[1]`; else 0.
 
     Returns how many prices of steps were computed now; those of listed steps come later.
     """
+    model, candidates, k, lists, width = tile.model, tile.candidates, tile.k, tile.lists, tile.width
     run = candidates.run[k]
     remembers = law_remembers(run[CODE])
-    grids, i, j, _ = tile
-    _, lists, spans, _, _, _ = buffers
-    step, told, count, shared, modes, sets, todo, _, _, _, _ = lists
+    shared, todo, smooth = lists.shared, lists.todo, tile.grids[3]
     followed = run[MODES] == FOLLOWED
     kind = candidates.step[run[FIRST_STEP] + u, KIND] if followed else np.int64(POINT)
     counts = not followed or candidates.step[run[FIRST_STEP] + u, MOVES] != 0
-    height, width = extent(grids, i, j)
     todo[:LOADED] = 1
     changed = False
     done = 0.0
@@ -178,48 +130,52 @@ def _price_next(model, candidates, k, u, begun, ends, tile, buffers, price):
                 if mode < 0:
                     continue
             known, after = modes_in_step(
-                model, candidates, k, u, part, mode, shared[part, LEAST], shared[part, MOST], spans
+                model, candidates, k, u, part, mode, shared[part, LEAST], shared[part, MOST], tile.spans
             )
             if known == UNSURE:
                 continue
             idle = known >= 0 and law_is_idle(run[CODE], known)
-            if not idle and grids[3][level, j * PARTS + smallest] == 0:
+            if not idle and smooth[level, tile.j * PARTS + smallest] == 0:
                 continue
             todo[smallest : smallest + size // SHORT] = 0
             if counts and not idle:
-                step[part, count[part]] = u
-                told[part, count[part]] = known
-                count[part] += 1
+                _list_step(lists, part, u, known)
             if remembers and (kind != WHOLE or not begun or known < 0):
-                _enter(modes[0 if kind == WHOLE else 1], at * size, size, after)
+                _enter(lists.modes[0 if kind == WHOLE else 1], at * size, size, after)
                 if kind != WHOLE:
-                    _copy_sets(sets, at * size, size)
+                    _copy_sets(lists.sets, at * size, size)
                 changed = changed or kind == WHOLE
         level += 1
     for smallest in range(PARTS):
         if todo[smallest] != 0 and smallest * SHORT < width:
-            done += _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, price)
+            done += _follow_each(tile, u, begun, ends, smallest)
             changed = changed or (remembers and kind == WHOLE)
     if changed:
-        _share(modes[0], sets[0], height, shared)
+        _share(lists.modes[0], lists.sets[0], tile.height, shared)
     return done
 
 
 @kernel
-def _price_sorted(model, candidates, k, u, tile, buffers, price):
+def _list_step(lists, part, u, known):
+    """List a step for a part, to be priced later; lists: a `StepLists`. known: what is known of its modes."""
+    n = lists.count[part]
+    lists.step[part, n] = u
+    lists.told[part, n] = known
+    lists.count[part] = n + 1
+
+
+@kernel
+def _price_sorted(tile, u):
     """Go through a step by a law that does not remember: list it for the parts of which all members stay in a mode, and
     price other parts by what their members do.
 
-    model, candidates, k, tile, buffers, price: as of `_price_next`.
+    tile: a `PricedTile`.
     u: the step, by its number among those of the run.
 
     Returns how many prices of steps were computed.
     """
-    grids, i, j, _ = tile
-    _, lists, spans, _, sorting, _ = buffers
-    step, told, count, _, _, _, todo, _, _, _, _ = lists
-    mode = sorting[3]
-    _, width = extent(grids, i, j)
+    model, candidates, k, todo, width = tile.model, tile.candidates, tile.k, tile.lists.todo, tile.width
+    mode, are_smooth = tile.sorting.mode, tile.grids[3]
     s = candidates.run[k, FIRST_STEP] + u
     todo[:LOADED] = 1
     yes = np.bool_(True)
@@ -229,24 +185,22 @@ def _price_sorted(model, candidates, k, u, tile, buffers, price):
         size = BROAD >> level
         for at in range(1 << level):
             smallest = at * (size // SHORT)
-            if (at + 1) * size > width or todo[smallest] == 0 or grids[3][level, j * PARTS + smallest] == 0:
+            if (at + 1) * size > width or todo[smallest] == 0 or are_smooth[level, tile.j * PARTS + smallest] == 0:
                 continue
             part = (1 << level) - 1 + at
             todo[smallest : smallest + size // SHORT] = 0
-            modes_at_nodes(model, candidates, k, s, part, spans, mode)
+            modes_at_nodes(model, candidates, k, s, part, tile.spans, mode)
             old, new = modes_of_all(mode)
             if old == UNSURE or old != new:
-                done += price_part(model, candidates, k, s, level, at * size, size, yes, no, tile, buffers, price)
+                done += price_part(tile, s, level, at * size, size, yes, no)
             elif not law_is_idle(candidates.run[k, CODE], old):
-                step[part, count[part]] = u
-                told[part, count[part]] = old
-                count[part] += 1
+                _list_step(tile.lists, part, u, old)
     for smallest in range(PARTS):
         first = smallest * SHORT
         last = min(first + SHORT, width)
         if todo[smallest] != 0 and first < width:
             level = np.int64(LEVELS - 1 if last - first == SHORT else NO_LEVEL)
-            done += price_part(model, candidates, k, s, level, first, last - first, no, no, tile, buffers, price)
+            done += price_part(tile, s, level, first, last - first, no, no)
     return done
 
 
@@ -300,29 +254,27 @@ def _share(modes, sets, height, shared):
 
 
 @kernel
-def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, price):
+def _follow_each(tile, u, begun, ends, smallest):
     """Follow the members of one of the smallest parts through a step.
 
     Where permanent sets become others, what is listed is priced first, with those that were.
 
-    model, candidates, k, u, begun, ends, tile, buffers, price: as of `_price_next`.
+    tile, u, begun, ends: as of `_price_next`.
     smallest: the number of the part among those of its level.
 
     Returns how many prices of steps were computed now, those of listed steps among them.
     """
+    model, candidates, k, price, lists = tile.model, tile.candidates, tile.k, tile.price, tile.lists
+    modes, sets, fresh, height = lists.modes, lists.sets, lists.fresh, tile.height
     run = candidates.run[k]
-    grids, i, j, _ = tile
-    lists = buffers[1]
-    modes, sets, todo, fresh, whole = lists[4], lists[5], lists[6], lists[8], lists[9]
-    height, width = extent(grids, i, j)
-    if todo[LOADED] == 0:
-        load_all(model, candidates, k, grids, i, j, whole)
-        todo[LOADED] = 1
+    if lists.todo[LOADED] == 0:
+        load_all(model, candidates, k, tile.grids, tile.i, tile.j, lists.whole)
+        lists.todo[LOADED] = 1
     first = smallest * SHORT
-    wide = min(SHORT, width - first)
+    wide = min(SHORT, tile.width - first)
     s = run[FIRST_STEP] + u
     if run[MODES] == PIECES:
-        _add_by_pieces(model, candidates, k, run[FIRST_STATE] + u, first, wide, height, buffers, price)
+        _add_by_pieces(tile, run[FIRST_STATE] + u, first, wide)
         return 1.0 * height * wide
     kind = candidates.step[s, KIND]
     if kind == POINT:
@@ -333,7 +285,7 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, 
                 price[b] += price_point(model, candidates, k, member, s, modes[ends, b], sets[ends, b], started)
         return 1.0 * height * wide
     no = np.bool_(False)
-    followed = price_part(model, candidates, k, s, np.int64(NO_LEVEL), first, wide, no, begun, tile, buffers, price)
+    followed = price_part(tile, s, np.int64(NO_LEVEL), first, wide, no, begun)
     changed = False
     for a in range(height):
         for b in range(a * BROAD + first, a * BROAD + first + wide):
@@ -341,7 +293,7 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, 
     if changed and kind == WHOLE and wide == SHORT:
         for level in range(LEVELS):
             part = (1 << level) - 1 + first // (BROAD >> level)
-            followed += _price_list(model, candidates, k, part, tile, buffers, price)
+            followed += _price_list(tile, part)
     to = np.int64(0) if kind == WHOLE else np.int64(1)
     for a in range(height):
         for b in range(a * BROAD + first, a * BROAD + first + wide):
@@ -350,17 +302,16 @@ def _follow_each(model, candidates, k, u, begun, ends, smallest, tile, buffers, 
 
 
 @kernel
-def _add_by_pieces(model, candidates, k, o, first, wide, height, buffers, price):
+def _add_by_pieces(tile, o, first, wide):
     """Add what the members of some columns do at a state by a law whose modes are pieces of one function.
 
-    model, candidates, k, buffers, price: as of `_price_next`.
+    tile: a `PricedTile`.
     o: the state.
     first, wide: the first column, and how many there are, SHORT at most.
-    height: rows of the tile.
     """
-    scratch, lists, _, following, _, _ = buffers
-    works = lists[10]
-    values = scratch[5]
+    model, candidates, k, following = tile.model, tile.candidates, tile.k, tile.following
+    works, price = tile.lists.works, tile.price
+    values = tile.scratch[5]
     count = wide * TALL
     member_works(model, PLACES + first * TALL, count, candidates.pose[o, 0], candidates.change[o, 0], works)
     values[:count] = 0.0
@@ -368,25 +319,24 @@ def _add_by_pieces(model, candidates, k, o, first, wide, height, buffers, price)
         candidates.run[k, CODE], candidates.law[k], model.curves, candidates.when[o], candidates.level[o],
         candidates.energy[o], works, count, following[0], following[1], values,
     )  # fmt: skip
-    for a in range(height):
+    for a in range(tile.height):
         for b in range(wide):
             price[a * BROAD + first + b] += values[b * TALL + a]
 
 
 @kernel
-def _price_list(model, candidates, k, part, tile, buffers, price):
+def _price_list(tile, part):
     """Price the steps that are listed for a part, which has none in its list then.
 
-    model, candidates, k, tile, buffers, price: as of `_price_next`.
+    tile: a `PricedTile`.
     part: its number.
 
     Returns how many prices of steps were computed.
     """
-    grids, i, j, error = tile
-    scratch, lists, _, following, _, _ = buffers
-    _, _, count, shared, _, sets, _, found, _, _, _ = lists
+    i, j, scratch, lists, price = tile.i, tile.j, tile.scratch, tile.lists, tile.price
+    shared, sets, found = lists.shared, lists.sets, lists.found
     plan, _, _, _, index, values, _ = scratch
-    steps = count[part]
+    steps = lists.count[part]
     if steps == 0:
         return 0.0
     level = np.int64(0)
@@ -399,46 +349,40 @@ def _price_list(model, candidates, k, part, tile, buffers, price):
     done = 0.0
     for n in range(1 if low == high else SETS):
         begin_part(level, first, scratch)
-        while next_candidates(grids, i, j, scratch):
+        while next_candidates(tile.grids, i, j, scratch):
             members = number_candidates(i, j, scratch)
-            load_members(model, candidates, k, index, members, np.int64(0))
+            load_members(tile.model, tile.candidates, tile.k, index, members, np.int64(0))
             values[:members] = 0.0
-            _price_few(model, candidates, k, part, low + 0.5 * n * (high - low), members, lists, following, values)
-            take_prices(grids, i, j, error, scratch, found[n])
+            _add_listed(tile, part, low + 0.5 * n * (high - low), members)
+            take_prices(tile.grids, i, j, tile.error, scratch, found[n])
         done += plan[PRICED]
-    height, _ = extent(grids, i, j)
-    for a in range(height):
+    for a in range(tile.height):
         for at in range(a * BROAD + first, a * BROAD + first + size):
             value = found[0, at]
             if high != low:
                 t = 2.0 * (sets[0, at] - low) / (high - low) - 1.0
                 value = 0.5 * t * ((t - 1.0) * value + (t + 1.0) * found[2, at]) + (1.0 - t * t) * found[1, at]
             price[at] += value
-    count[part] = 0
+    lists.count[part] = 0
     return done * steps
 
 
 @kernel
-def _price_few(model, candidates, k, part, kept, members, lists, following, values):
-    """Add what some members do in the steps that are listed for a part.
+def _add_listed(tile, part, kept, members):
+    """Add what some members do in the steps that are listed for a part to `found` of the tile's scratch.
 
-    In:
-      model: with the members.
-      candidates, k: a `PricedCandidates`, and the number of the run.
-      part: its number.
-      kept: the permanent set of the members (m).
-      members: how many there are.
-      lists: of `make_lists`.
-    Out:
-      values (members or more,): added to.
-      following: of `make_following`, overwritten.
+    tile: a `PricedTile`, with the members in its model.
+    part: its number.
+    kept: the permanent set of the members (m).
+    members: how many there are.
     """
+    model, candidates, k, lists, following = tile.model, tile.candidates, tile.k, tile.lists, tile.following
+    values = tile.scratch[5]
     run = candidates.run[k]
-    step, told, count, _, _, _, _, _, _, _, works = lists
     yes = np.bool_(True)
-    for n in range(count[part]):
-        known = told[part, n]
-        s = run[FIRST_STEP] + step[part, n]
+    for n in range(lists.count[part]):
+        known = lists.told[part, n]
+        s = run[FIRST_STEP] + lists.step[part, n]
         if known <= LEAVES:
             following[4][0] = LEAVES - known
             following[5][0] = kept
@@ -449,10 +393,10 @@ def _price_few(model, candidates, k, part, kept, members, lists, following, valu
                     model, candidates, k, at, wide, s, following[4][0], following[5][0], yes, yes, following, few
                 )
             continue
-        o = run[FIRST_STATE] + step[part, n]
+        o = run[FIRST_STATE] + lists.step[part, n]
         behind = o + 1
         if run[MODES] == FOLLOWED:
             o = candidates.step[s, FIRST_STAGE]
             behind = candidates.step[s, LAST_STAGE]
         following[5][0, 0] = kept
-        add_states(model, candidates, k, o, behind, members, known, following[5][0, :1], works, following, values)
+        add_states(model, candidates, k, o, behind, members, known, following[5][0, :1], lists.works, following, values)

@@ -1,30 +1,20 @@
 """Further times at which steps of a compiled scene end."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
 from mdstopo.general.model.general_model import GeneralModel
 from mdstopo.general.scene.driven_integrals import integrated_ends
 from mdstopo.mechanics.kinematics.timed import COORDINATE, DERIVED
-from mdstopo.scene.signal_segments import cut_linear, parents_of
+from mdstopo.scene.signal_segments import cut_linear, cut_segments, parents_of
 
 
 def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
     """The model with further times at which segments end; loads and laws are the same functions of time as before."""
-    old = model.times
-    apart = 1e-10 * float(old[-1] - old[0])
-    asked = np.sort(np.asarray(times, dtype=np.float64))
-    behind = np.clip(np.searchsorted(old, asked), 1, len(old) - 1)
-    far = np.minimum(np.abs(asked - old[behind - 1]), np.abs(old[behind] - asked)) > apart
-    new: list[float] = []
-    for time in asked[far].tolist():
-        if not new or time - new[-1] > apart:
-            new.append(time)
-    whole = np.sort(np.concatenate([old, new]))
-    parent, tau = parents_of(old, whole)
-    cut = partial(cut_linear, parent=parent, tau=tau)
+    further = cut_segments(model, times)
+    whole = further.times
+    parent, tau = parents_of(model.times, whole)
     d = model.drive[parent]
     x = tau[:, None]
     drive = np.stack(
@@ -40,13 +30,10 @@ def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
         row, sides = model.driven_par[i], model.driven_mode[parent, i]
         start = drive[0, i, 0], drive[0, i, 1]
         drive[:, i, :2] = integrated_ends(row, sides, whole, *start)[:, 0]
-    return model._replace(
-        times=whole,
+    return further._replace(
         active=model.active[parent],
         timed_mode=model.timed_mode[parent],
         driven_mode=model.driven_mode[parent],
-        level=cut(model.level),
-        force=cut(model.force),
-        load_force=cut(model.load_force),
+        level=cut_linear(model.level, parent, tau),
         drive=drive.reshape(len(parent), *model.drive.shape[1:]),
     )

@@ -274,10 +274,30 @@ def row_cotangents(
     explicit_part(model, segment, j, who, slopes, t, member_state, q, v, a, sign, out)
     if bar_set.shape[0] > 0:
         add_sets(model, segment, member_state, q, v, z, 0.0, bar_set)
+    if c <= 0.0 or c >= 1.0:
+        _add_times_of_row(model, history, member_state, count, k, c, rate, bars, bar_set, out)
+    return w, (c if w == k else 1.0)
+
+
+@kernel
+def _add_times_of_row(model, history, member_state, count, k, c, rate, bars, bar_set, out):
+    """What times that vary add where a row is read at the start or the end of a step, which may be one of them.
+
+    In:
+      model: the compiled scene.
+      history, count: the history of steps, and how many steps there are.
+      member_state (3, columns): state of the members.
+      k, c: the step, and 0 or 1.
+      rate: of the response there.
+    In and out:
+      bars (3, n): cotangents of q and v; those at the end of a step, or in front of the event at its start.
+      bar_set (slots,): cotangents of the permanent sets, likewise.
+      out (M_padded + P,): derivative by alpha^mu and by parameters.
+    """
     at = k if c <= 0.0 else k + 1
-    if model.varied.shape[0] > 0 and (c <= 0.0 or c >= 1.0):
+    if model.varied.shape[0] > 0:
         # what lies behind the state does nothing to a value before it
-        behind = bars[1] if c <= 0.0 or at == count else np.zeros(n)
+        behind = bars[1] if c <= 0.0 or at == count else np.zeros(bars.shape[1])
         add_times(model, history, member_state, count, at, np.int64(-1), np.bool_(False), behind, rate, out)
     if c <= 0.0 and k > 0:
         apply_saltation_transposed(model, history, k, bars[0], bars[1], bar_set, np.empty(0), member_state, out)
@@ -286,12 +306,11 @@ def row_cotangents(
         if event >= 0:
             if model.varied.shape[0] > 0:
                 add_event(model, history, member_state, event, rate, out)
-            for d in range(n):
+            for d in range(bars.shape[1]):
                 bars[0, d] -= rate * history.saltation[event, 0, d]
                 bars[1, d] -= rate * history.saltation[event, 1, d]
             if bar_set.shape[0] > 0:
                 time_back(model, history, event, rate, bar_set)
-    return w, (c if w == k else 1.0)
 
 
 @kernel

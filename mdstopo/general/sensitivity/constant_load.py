@@ -8,7 +8,7 @@ them. Free bodies make the system singular: least squares of least norm.
 
 import numpy as np
 
-from mdstopo.compiler.jit import entry
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.design.gather import add_design, explicit_part, force_sign
 from mdstopo.general.dynamics.accelerations import joint_slopes, make_workspace, solve_accelerations
 from mdstopo.general.dynamics.forces import general_forces
@@ -98,11 +98,28 @@ def hold(
         return
     general_forces(model, member_state, segment, t, q, rest, np.bool_(True), workspace)
     joint_slopes(model, q, v, a, lam, workspace)
+    _fill_system(model, workspace, bars[0], row_bar, matrix, right)
+
+
+@kernel
+def _fill_system(model, workspace, by_q, by_lam, matrix, right):
+    """The linear system of a scene held at one state.
+
+    In:
+      model: the compiled scene.
+      workspace: workspace of a balance (`accelerations.Workspace`), with stiffness and slopes of the joints.
+      by_q (n,), by_lam (n_row,): slopes of the response by coordinates and multipliers.
+    Out:
+      matrix (n + n_row, n + n_row): [K Phi_q^T; Phi_q 0].
+      right (n + n_row,): both slopes.
+    """
+    n = by_q.shape[0]
+    n_row = by_lam.shape[0]
     matrix[:] = 0.0
     for d in range(n):
-        right[d] = bars[0, d]
+        right[d] = by_q[d]
     for r in range(n_row):
-        right[n + r] = row_bar[r]
+        right[n + r] = by_lam[r]
     for p in range(model.pair.shape[0]):
         for i in range(pair_freedoms(model)):
             for m in range(pair_freedoms(model)):

@@ -1,4 +1,4 @@
-"""What Python asks of the joints before anything moves."""
+"""What Python asks of the start: joints assembled, and the linear equations of small motion about it."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from mdstopo.general.dynamics.members import scale_general
 from mdstopo.general.dynamics.projection import project
 from mdstopo.general.model.general_model import JOINT_ROWS, unpack_general
 from mdstopo.general.model.strides import pair_freedoms, place_in_joint, place_in_pair, place_of_turn
-from mdstopo.general.steps.run_start import scene_size, start_modes
+from mdstopo.general.steps.run_start import modes_at_start, scene_size
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, rotations, turn_bodies
 
 
@@ -63,7 +63,7 @@ def linearise(ints, floats, alpha, member_state, stiffness, mass, rows):
     a = np.zeros(n)
     lam = np.zeros(model.size[0])
     scale_general(model.block, model.power, alpha, member_state)
-    start_modes(model, member_state, workspace, q, v, a, lam, np.bool_(True))
+    modes_at_start(model, member_state, workspace, q, v, a, lam, np.bool_(True))
     solve_accelerations(model, member_state, np.int64(0), model.times[0], q, v, np.bool_(True), workspace, a, lam)
     for d in range(n):
         mass[d, d] = model.mass[d]

@@ -42,7 +42,7 @@ def scene_size(model):
 
 
 @kernel
-def start_modes(model, member_state, workspace, q, v, a, lam, knots):
+def modes_at_start(model, member_state, workspace, q, v, a, lam, knots):
     """Set the modes and permanent sets at the start: by elongation, then by its rate, then by its second derivative.
 
     The last is that of a balance with the modes that elongations and rates tell.

@@ -307,6 +307,26 @@ def keep_state(history, k, t, q, v, mu, nu):
 
 
 @kernel
+def keep_step(history, k, segment, events, stages, t, q, v, push):
+    """Store that step k has been made, and its end as the next state.
+
+    history: the history of steps (`StepHistory`).
+    k: number of the step, which comes behind step k - 1.
+    segment: number of the stretch of time between two breakpoints that it lies in.
+    events: how many had happened before its end.
+    stages: how many there are by now, those of the step included.
+    t: time at its end (s).
+    q (n_q,), v (n,): coordinates and velocities there.
+    push (2, n_row): multipliers that put these on the joints (`projection`).
+    """
+    history.index[k, PARENT] = k - 1
+    history.index[k, SEGMENT] = segment
+    history.index[k, EVENTS] = events
+    history.index[k + 1, FIRST] = stages
+    keep_state(history, k + 1, t, q, v, push[0], push[1])
+
+
+@kernel
 def restore_modes(history, happened, member_state):
     """The modes and sets of members as they were after so many events."""
     e = events_included(member_state)
