@@ -199,3 +199,22 @@ def test_a_fit_that_is_stopped_goes_on_where_it_was(drop: FitProblem) -> None:
     }
     with pytest.raises(StoppedError):
         fitted(problem, problem.initial, stop_after(1))
+
+
+def test_each_motion_of_a_fit_is_counted_once(drop: FitProblem) -> None:
+    """But those that are lost with a start that was stopped, and computed again."""
+    fit = drop.case.fit
+    assert fit is not None
+    problem = measured(FitProblem(replace(drop.case, fit=replace(fit, starts=2, seed=7)), drop.measured), TRUTH, 8)
+    whole = run_fit(problem)
+    counted = whole.simulations
+    assert 0 < counted <= problem.simulations
+    assert run_fit(problem, before=whole).simulations == counted  # nothing is new but what was known
+    first = whole.starts[0].evaluations
+    stopped = run_fit(problem, stop=stop_after(first))
+    assert len(stopped.starts) == 1
+    kept = stopped.simulations
+    assert run_fit(problem, before=stopped, stop=stop_after(0)).simulations == kept
+    last = run_fit(problem, before=stopped)
+    # one more: the minimum of the first start alone
+    assert last.simulations == counted + 1
