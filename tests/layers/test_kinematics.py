@@ -54,6 +54,7 @@ OF_ONE_DIMENSION = {"planar_scene.py", "spatial_scene.py", "turning_drives.py"}
 #: modules that take something of the plane itself, and what
 OF_THE_PLANE = {
     "generalized_alpha.py": {"planar_poses"},  # copy_rows, which copies any rows
+    "generalized_alpha_switch.py": {"planar_poses"},  # likewise
     "general_model.py": {"planar"},  # says how the bodies of this model move
     "planar_scene.py": {"planar"},  # what is planar when a case is compiled
     "gather.py": {"planar_poses"},

@@ -18,21 +18,16 @@ from mdstopo.compiler.jit import entry
 from mdstopo.general.dynamics.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.dynamics.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
 from mdstopo.general.events.event_log import CHATTER, log_at_breakpoint, log_switches
-from mdstopo.general.events.events import first_sign, has_switches, room_for_watched, smallest_margin, watch_all
-from mdstopo.general.events.locate import (
-    CUTS,
-    RESOLUTION,
-    TRIALS,
-    cut_at,
-    foreseen_trial,
-    matters,
-    narrowed,
-    next_trial,
-    note_trial,
-    quintic_ends,
-)
+from mdstopo.general.events.events import has_switches, room_for_watched, watch_all
 from mdstopo.general.events.permanent_sets import begins_divided
-from mdstopo.general.integrators.generalized_alpha_step import AUXILIARY, VELOCITY, advance, make_step_room, rate_of
+from mdstopo.general.integrators.generalized_alpha_step import AUXILIARY, VELOCITY, make_step_room, rate_of
+from mdstopo.general.integrators.generalized_alpha_switch import (
+    FixedRun,
+    close_in,
+    first_piece,
+    make_step,
+    make_switch_room,
+)
 from mdstopo.general.model.general_model import unpack_general
 from mdstopo.general.steps.run_start import ROUNDING, log_start, modes_at_start, motion_at_start, scene_size
 from mdstopo.general.steps.step_history import (
@@ -47,7 +42,6 @@ from mdstopo.integrators.springs_generalized_alpha import FEWEST
 from mdstopo.integrators.steps import (
     ACCEPTED,
     CHATTERING,
-    FORCES,
     NEEDS_ROOM,
     NON_FINITE,
     OK,
@@ -104,7 +98,6 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     no = np.bool_(False)
     size = scene_size(model)
     rounding = ROUNDING * size
-    nowhere = np.int64(-1)
     rel = np.empty((n_pair, pose_size(model)))
     rel0 = np.empty((n_pair, pose_size(model)))
     before = np.empty((n_pair, pose_size(model)))
@@ -113,17 +106,6 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     end_q = np.zeros(n_q)
     ends = np.zeros((3, n))
     guess = np.zeros((3, n))
-    trial_q = np.zeros(n_q)
-    trial = np.zeros((3, n))
-    trials = np.zeros((2, 2))
-    curve_q = np.empty((2, n_q))
-    curve = np.empty((2, 2, n))
-    cut = np.empty(CUTS + 1)
-    beyond_q = np.zeros((CUTS + 1, n_q))
-    beyond = np.zeros((CUTS + 1, 3, n))
-    left_q = np.zeros(n_q)
-    left_v = np.zeros(n)
-    kept = np.zeros((3, n))
     push = np.zeros((2, n_row))
     lam = np.zeros(n_row)
     a0 = np.zeros(n)
@@ -158,7 +140,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     shortest = np.empty(n_pair)
     shortest_at_start(model, rel0, shortest)
     span = times[times.shape[0] - 1] - t
-    step_room = make_step_room(model)
+    run = FixedRun(
+        model, tables[0], member_state, newton_tolerance, size, rounding, graze, watched, workspace, history, q, state,
+        guess, extent, rel0, make_step_room(model), rel, before, lam, where, work,
+    )  # fmt: skip
+    switch_room = make_switch_room(model)
     step = settings[2]
     if not step > 0.0:
         rate = rate_of(model, workspace)
@@ -198,109 +184,28 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 return STEP_TOO_SMALL, count, events, t
             lands = done + 1.0 >= pieces
             starting = np.bool_(known == 0)
-            code, used, singular = advance(
-                model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance, size,
-                stages, workspace, history, end_q, ends, push, extent, rel0, step_room, work,
-            )  # fmt: skip
+            code, used, singular = make_step(run, segment, t, h, starting, stages, state, end_q, ends, push)
             if code != OK:
                 where[0] = singular
                 return code, count, events, t
             relative_pose(model, end_q, ends[VELOCITY], rel)
             happens = False
-            who = nowhere
+            who = np.int64(-1)
             if switching:
-                margin, who = smallest_margin(model, t + h, member_state, rel, watched)
-                low = 0.0
-                high = h
-                top = 0
-                cuts = 0
-                cut[0] = h
-                copy_vector(end_q, beyond_q[0])
-                copy_rows(ends, beyond[0])
-                copy_vector(q, left_q)
-                copy_vector(v, left_v)
-                while top >= 0:  # as `landing.first_piece` does
-                    relative_pose(model, left_q, left_v, before)
-                    relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
-                    dip, near = first_sign(
-                        model, t + low, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY], before,
-                        rel, cut[top] - low, rounding, watched,
-                    )  # fmt: skip
-                    middle = cut_at(dip, near, low, cut[top])
-                    if middle < 0.0 or cuts == CUTS:
-                        if top == 0 and margin < -rounding:
-                            break
-                        low = cut[top]
-                        copy_vector(beyond_q[top], left_q)
-                        copy_vector(beyond[top, VELOCITY], left_v)
-                        top -= 1
-                        continue
-                    cuts += 1
-                    top += 1
-                    cut[top] = middle
-                    copy_rows(state, kept)
-                    code, _, singular = advance(
-                        model, tables[0], member_state, segment, t, middle, starting, q, kept, guess, newton_tolerance,
-                        size, nowhere, workspace, history, beyond_q[top], beyond[top], push, extent, rel0,
-                        step_room, work,
-                    )  # fmt: skip
-                    if code != OK:
-                        where[0] = singular
-                        return code, count, events, t
-                    relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
-                    value, near_who = smallest_margin(model, t + middle, member_state, rel, watched)
-                    if value < -rounding:
-                        high = middle
-                        margin = value
-                        who = near_who
-                        break
-                    if value < graze and matters(model, t + middle, member_state, rel, near_who):
-                        where[2] = near_who
-                relative_pose(model, left_q, left_v, before)
+                code, singular, margin, who, low, high, top = first_piece(
+                    run, switch_room, segment, t, h, starting, end_q, ends
+                )
                 happens = margin < -rounding
+                if happens and code == OK:
+                    code, singular, h, who = close_in(
+                        run, switch_room, segment, t, h, starting, low, high, top, margin, who
+                    )
+                if code != OK:
+                    where[0] = singular
+                    return code, count, events, t
                 if happens:
-                    at_low, _ = smallest_margin(model, t + low, member_state, before, watched)
-                    at_low = max(at_low, rounding)
-                    at_high = margin
-                    side = 0
-                    piece = low
-                    stop = high
-                    quintic_ends(
-                        model, member_state, segment, t, piece, stop, left_q, left_v, beyond_q[top],
-                        beyond[top, VELOCITY], workspace, lam, curve_q, curve,
-                    )  # fmt: skip
-                    work[FORCES] += 2
-                    for tries in range(TRIALS):
-                        foreseen = foreseen_trial(
-                            model, member_state, segment, t, piece, stop, curve_q, curve, trials, tries, rounding,
-                            watched, trial_q, trial[VELOCITY], rel,
-                        )  # fmt: skip
-                        middle = next_trial(
-                            low, high, at_low, at_high, foreseen, rounding, RESOLUTION * (abs(t) + h), tries
-                        )
-                        if middle < 0.0:
-                            break
-                        copy_rows(state, kept)
-                        code, _, singular = advance(
-                            model, tables[0], member_state, segment, t, middle, starting, q, kept, guess,
-                            newton_tolerance, size, nowhere, workspace, history, trial_q, trial, push, extent,
-                            rel0, step_room, work,
-                        )  # fmt: skip
-                        if code != OK:
-                            where[0] = singular
-                            return code, count, events, t
-                        relative_pose(model, trial_q, trial[VELOCITY], rel)
-                        value, who = smallest_margin(model, t + middle, member_state, rel, watched)
-                        note_trial(trials, middle, value)
-                        low, high, at_low, at_high, side = narrowed(
-                            low, high, at_low, at_high, middle, value, rounding, side
-                        )
-                    h = high
                     lands = lands and t + h >= end
-                    code, used, singular = advance(
-                        model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance,
-                        size, stages, workspace, history, end_q, ends, push, extent, rel0, step_room, work,
-                    )  # fmt: skip
+                    code, used, singular = make_step(run, segment, t, h, starting, stages, state, end_q, ends, push)
                 relative_pose(model, end_q, ends[VELOCITY], rel)
             finite = True
             for d in range(n_q):
