@@ -70,7 +70,11 @@ def make_units(model, rows, columns):
 
 @kernel
 def _carve_units(place, room, many, n, slots, columns):
-    """`Units`, many of them, whose other arrays lie behind each other in `room`: most sweeps have none of them."""
+    """`Units` whose other arrays lie behind each other in `room`, as most sweeps have none of them.
+
+    place: of `Units`. room (many (21 n + slots + columns + 1),). many, n, slots, columns: U, freedoms of all bodies,
+    permanent sets, M_padded + P.
+    """
     lam_v = many * n
     lam_x = 2 * lam_v
     z = 4 * lam_v
