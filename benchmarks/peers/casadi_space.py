@@ -1,4 +1,7 @@
-"""CasADi with CVODES and its adjoint in space, as scalar expressions, multipliers of the joints eliminated."""
+"""CasADi in space, with multipliers of the joints eliminated.
+
+As scalar expressions for CVODES and its adjoint; or in fixed steps.
+"""
 
 from typing import Any
 
@@ -14,9 +17,16 @@ from benchmarks.peers.table import Objective
 Scalar = Any
 
 
-def make(problem: SpatialProblem, tolerance: float = 1e-8, compiled: bool = False) -> Objective:
-    """As the table says. compiled: by a C compiler, which takes minutes."""
+def make(problem: SpatialProblem, tolerance: float = 1e-8, compiled: bool = False, steps: int = 0) -> Objective:
+    """As the table says. compiled: by a C compiler, which takes minutes, with CVODES many.
+
+    steps: above 0, so many fixed ones in place of CVODES (`casadi_space_steps`).
+    """
     start = np.concatenate([problem.start.ravel(), problem.turn.ravel(), np.zeros(6 * problem.bodies)])
+    if steps > 0:
+        from benchmarks.peers.casadi_space_steps import objective_of_steps
+
+        return objective_of_steps(problem, start, steps, compiled)
     return objective_of(problem, model_of(problem), start, tolerance, "cvodes", compiled)
 
 
@@ -27,9 +37,27 @@ def model_of(problem: SpatialProblem) -> Model:
     """
     count = problem.bodies
     y, alpha = ca.SX.sym("y", 13 * count), ca.SX.sym("alpha", problem.members)
-    turns = [_rotation(y[3 * count + 4 * b : 3 * count + 4 * b + 4]) for b in range(count)]
+    turns = _turns(problem, y)
     v, w = y[7 * count : 10 * count], y[10 * count :]
     pulls, energy = _members(problem, y, turns, alpha)
+    # what the springs pull is minus the slope of their energy
+    power = -sum(
+        ca.dot(pull[:3], v[3 * b : 3 * b + 3]) + ca.dot(turns[b].T @ pull[3:], w[3 * b : 3 * b + 3])
+        for b, pull in enumerate(pulls)
+    )
+    none = ca.SX(0, 1)
+    return Model(y, none, alpha, accelerations_of(problem, y, pulls), energy, power, none, none)
+
+
+def _turns(problem: SpatialProblem, y: Scalar) -> list[Scalar]:
+    count = problem.bodies
+    return [rotation_of(y[3 * count + 4 * b : 3 * count + 4 * b + 4]) for b in range(count)]
+
+
+def accelerations_of(problem: SpatialProblem, y: Scalar, pulls: list[Scalar]) -> Scalar:
+    """The rate of a state y (13 B) under forces and moments (6,) of the members on every body, in global axes."""
+    count, turns = problem.bodies, _turns(problem, y)
+    v, w = y[7 * count : 10 * count], y[10 * count :]
     total = [ca.SX(ca.DM(force)) + pull for force, pull in zip(problem.force, pulls, strict=True)]
     e_rates, forces = [], []
     for b, turn in enumerate(turns):
@@ -49,17 +77,11 @@ def model_of(problem: SpatialProblem) -> Model:
         factors = ca.ldl(rows @ inverse @ rows.T)
         ahead = inverse @ (force - rows.T @ ca.ldl_solve(rows @ ahead - wanted, *factors))
     by_body = [ahead[6 * b : 6 * b + 6] for b in range(count)]
-    parts = [v, *e_rates, *(each[:3] for each in by_body), *(each[3:] for each in by_body)]
-    # what the springs pull is minus the slope of their energy
-    power = -sum(
-        ca.dot(pull[:3], v[3 * b : 3 * b + 3]) + ca.dot(turns[b].T @ pull[3:], w[3 * b : 3 * b + 3])
-        for b, pull in enumerate(pulls)
-    )
-    none = ca.SX(0, 1)
-    return Model(y, none, alpha, ca.vertcat(*parts), energy, power, none, none)
+    return ca.vertcat(v, *e_rates, *(each[:3] for each in by_body), *(each[3:] for each in by_body))
 
 
-def _rotation(e: Scalar) -> Scalar:
+def rotation_of(e: Scalar) -> Scalar:
+    """The matrix of a unit quaternion."""
     across = ca.skew(e[1:])
     return ca.SX.eye(3) + 2.0 * e[0] * across + 2.0 * across @ across
 

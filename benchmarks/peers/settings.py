@@ -74,7 +74,8 @@ def ring_in_space() -> Iterator[Entry]:
     yield from ours_on_a_loop()
     for tolerance in (1e-6, 1e-8):
         yield Entry("casadi", {"tolerance": tolerance})
-        yield Entry("casadi", {"tolerance": tolerance, "compiled": True})
+    for steps in (6, 8, 12, 16):
+        yield Entry("casadi", {"steps": steps, "compiled": True})
     for steps in (6, 8, 12, 16):
         yield Entry("jax", {"steps": steps, "rolled": True})
 

@@ -100,3 +100,23 @@ def test_installed_peers_find_a_peak_inside_in_space(name):
     ((found,),) = race(course, [Entry(name, setting)], rounds=1, seconds=0.0, peers=PEERS_IN_SPACE)
     assert found.value_error < 1e-6
     assert found.gradient_error < 1e-5
+
+
+def test_casadi_in_fixed_steps_has_the_energy_and_the_gradient_of_the_ring():
+    pytest.importorskip("casadi")
+    import mdstopo
+    from benchmarks.peers import casadi_space
+    from benchmarks.peers.translate import spatial_problem_of
+
+    document = json.loads(content("ring"))
+    for points in document["points"].values():
+        points["grid"]["list"] = points["grid"]["list"][::4]
+    case = read_case(json.dumps(document), overrides={"solver.tolerance": "1e-10"})
+    alpha = np.linspace(0.1, 1.0, case.n_design)
+    exact = mdstopo.evaluate(case, alpha)
+    objective = casadi_space.make(spatial_problem_of(case), steps=16)
+    value, slopes = objective(alpha, True)
+    assert value == pytest.approx(exact.objectives["G"], rel=1e-9)
+    assert objective(alpha, False) == (pytest.approx(value, rel=1e-14), None)
+    largest = np.abs(exact.gradients["G"]).max()
+    assert np.abs(slopes - exact.gradients["G"]).max() < 1e-7 * largest

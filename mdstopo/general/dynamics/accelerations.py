@@ -20,7 +20,13 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.dynamics.forces import add_inerters, add_tangents_of_inerters, general_forces
-from mdstopo.general.dynamics.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
+from mdstopo.general.dynamics.joint_matrix import (
+    SINGULAR,
+    factor_joints,
+    set_inverse_masses,
+    solve_joints,
+    spread_masses,
+)
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
 from mdstopo.general.model.strides import (
@@ -39,11 +45,12 @@ from mdstopo.general.model.switches import (
     DIAGONAL,
     OF_JOINTS,
     SECOND,
+    SWITCHES,
     THOROUGH,
     TURNING,
-    carriers,
-    movers,
-    switches_of,
+    movers_of,
+    set_carriers,
+    set_switches,
 )
 from mdstopo.integrators.banded import factorise, solve
 from mdstopo.integrators.runge_kutta_tables import STAGES
@@ -101,30 +108,36 @@ NO_SHIFT, OF_STEP = range(2)
 
 @kernel
 def make_workspace(model):
-    """A workspace for one state. Most of it lies in one piece: forty pieces would take two microseconds to make."""
+    """A workspace for one state, in three pieces: forty would take two microseconds to make."""
     n = model.mass.shape[0]
     both = pair_freedoms(model)
     rows = most_rows(model)
     of_pair = pose_size(model) + sums_size(model) + 3 * both * both
-    of_joint = (2 + 4 * both) * rows + both * both + 4 * joint_places(model)
+    of_joint = (2 + 5 * both) * rows + both * both + 4 * joint_places(model)
     of_body = attitude(model) + 2 * shift_size(model)
     room = np.zeros(
         model.pair.shape[0] * of_pair
         + model.joint.shape[0] * of_joint
         + model.home.shape[0] * of_body
-        + n * (2 + load_slopes(model) + _kept_stages(model))
+        + n * (3 + load_slopes(model) + _kept_stages(model))
         + 4 * joint_places(model)
         + model.size[3]
-        + model.unknown_index.shape[0]
+        + 2 * model.unknown_index.shape[0]
+        + 2 * model.size[0]
     )
-    inverse = inverse_masses(model)
     solved = model.size[0]
     for d in range(n):
         solved += model.free[d]
-    workspace = _carve_workspace(
-        model, room, np.empty((solved, 3 * model.size[1] + 1)), np.zeros(solved, np.int64), _scales(model), inverse,
-        spread_masses(model, inverse), np.ones((2, model.size[0])), movers(model), carriers(model), switches_of(model),
-    )  # fmt: skip
+    numbers = np.zeros(SWITCHES + 2 * model.pair.shape[0] + solved, np.int64)
+    workspace = _carve_workspace(model, room, np.empty((solved, 3 * model.size[1] + 1)), numbers)
+    _set_scales(model, workspace.scale)
+    set_inverse_masses(model, workspace.inverse)
+    spread_masses(model, workspace.inverse, workspace.spread)
+    workspace.diagonal[:] = 1.0
+    for p in range(model.pair.shape[0]):
+        workspace.moves[p] = movers_of(model, p)
+    set_carriers(model, workspace.carries)
+    set_switches(model, workspace.switches)
     shift_tangents(model, model.q0, model.q0, workspace.tangents[NO_SHIFT])
     return workspace
 
@@ -136,14 +149,13 @@ def _kept_stages(model):
 
 
 @kernel
-def _carve_workspace(model, room, band, pivots, scale, inverse, spread, diagonal, moves, carries, switches):
-    """A `Workspace` whose other arrays lie behind each other in `room`.
+def _carve_workspace(model, room, band, numbers):
+    """A `Workspace` whose arrays but the band lie behind each other in `room`, those of integers in `numbers`.
 
     It is a function of its own because of compile time: no references are counted of arrays that are cut out of one
     that is given. Where the array is made, counting them would be most of the code.
 
-    model: the compiled scene. room: zeros.
-    band, pivots, scale, inverse, spread, diagonal, moves, carries, switches: the workspace's other fields.
+    model: the compiled scene. room: zeros. band: the workspace's banded matrix. numbers: zeros.
     """
     n = model.mass.shape[0]
     bodies = model.home.shape[0]
@@ -171,6 +183,12 @@ def _carve_workspace(model, room, band, pivots, scale, inverse, spread, diagonal
     gram = own + model.size[3]
     x = gram + model.unknown_index.shape[0]
     slopes = x + _kept_stages(model) * n
+    tangents = slopes + 2 * bodies * shift_size(model)
+    scale = tangents + model.unknown_index.shape[0]
+    inverse = scale + n
+    spread = inverse + n_joint * rows * both
+    moves = SWITCHES + n_pair
+    carries = moves + n_pair
     return Workspace(
         room[:turned].reshape((bodies, attitude(model))),
         room[turned:rel].reshape((n_pair, pose_size(model))),
@@ -186,33 +204,32 @@ def _carve_workspace(model, room, band, pivots, scale, inverse, spread, diagonal
         room[jac:by_q].reshape((n_joint, rows, both)),
         room[by_q:by_v].reshape((n_joint, rows, both)),
         band,
-        pivots,
+        numbers[carries:],
         room[gram:x],
-        scale,
-        inverse,
-        spread,
+        room[tangents:scale],
+        room[scale:inverse],
+        room[inverse:spread].reshape((n_joint, rows, both)),
         room[by_v:pull].reshape((n_joint, rows, both)),
         room[own:gram],
-        diagonal,
+        room[spread:].reshape((2, model.size[0])),
         room[stiffness:own].reshape((n_joint + 1, 4, joint_places(model))),
         room[pull:stiffness].reshape((n_joint, both, both)),
         room[turn:known],
-        moves,
-        carries,
-        switches,
+        numbers[SWITCHES:moves],
+        numbers[moves:carries],
+        numbers[:SWITCHES],
         room[x:slopes].reshape((_kept_stages(model), n)),
-        room[slopes:].reshape((2, bodies, shift_size(model))),
+        room[slopes:tangents].reshape((2, bodies, shift_size(model))),
     )
 
 
 @kernel
-def _scales(model):
-    """(n_place,): 1/sqrt(mass) of free coordinates, so that their diagonal is about 1; 1 of all else."""
-    scale = np.ones(model.unknown_index.shape[0])
+def _set_scales(model, scale):
+    """scale (n_place,) = 1/sqrt(mass) of free coordinates, so that their diagonal is about 1; 1 of all else."""
+    scale[:] = 1.0
     for d in range(model.mass.shape[0]):
         if model.free[d] != 0:
             scale[model.unknown_index[d]] = 1.0 / np.sqrt(model.mass[d])
-    return scale
 
 
 @part
@@ -690,7 +707,7 @@ def pairs_vjp(model, workspace, moves, k, c, z, bar_q, bar_v):
     Constant:
       model: the compiled scene.
       workspace: the workspace (`switches`).
-      moves (n_pair,): which bodies of each pair move (`switches.movers`); 0: the pair is left out.
+      moves (n_pair,): which bodies of each pair move (`switches.movers_of`); 0: the pair is left out.
       k, c (n_pair, 2 D, 2 D): K and C by pairs.
       z (n,): virtual displacements; driven parts are 0.
     Out:

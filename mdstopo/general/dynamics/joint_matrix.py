@@ -26,24 +26,21 @@ SINGULAR = 1e-12
 
 
 @kernel
-def inverse_masses(model):
-    """(n,): 1 over the mass (kg) or inertia (kg m^2) of each coordinate; 0 where it is driven: no force moves it."""
-    inverse = np.zeros(model.mass.shape[0])
+def set_inverse_masses(model, inverse):
+    """inverse (n,) = 1 over the mass (kg) or inertia (kg m^2) of each coordinate; 0, as it was before, where it is
+    driven: no force moves it."""
     for d in range(inverse.shape[0]):
         if model.free[d] != 0:
             inverse[d] = 1.0 / model.mass[d]
-    return inverse
 
 
 @kernel
-def spread_masses(model, inverse):
-    """(n_joint, rows, 2 D): `inverse_masses` (n,) of the coordinate that each slope of the joints is one by."""
-    spread = np.empty((model.joint.shape[0], most_rows(model), pair_freedoms(model)))
+def spread_masses(model, inverse, spread):
+    """spread (n_joint, rows, 2 D) = inverse masses (n,) of the coordinate that each slope of the joints is one by."""
     for j in range(spread.shape[0]):
         for r in range(most_rows(model)):
             for i in range(pair_freedoms(model)):
                 spread[j, r, i] = inverse[place_in_joint(model, j, i)]
-    return spread
 
 
 @kernel

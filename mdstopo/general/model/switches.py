@@ -15,14 +15,13 @@ SWITCHES = 8
 #: stays zero); whether tangents are left as what they follow from: poses and sums over members of pairs, and the state;
 #: whether a response is the stored energy, which is then kept at stages where steps begin or end
 DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART, TURNING, UNFORMED, STORED = range(SWITCHES)
-#: which bodies of a pair move (`movers`)
+#: which bodies of a pair move (`movers_of`)
 BOTH, SECOND, FIRST = 1, 2, 3
 
 
 @kernel
-def switches_of(model):
-    """The switches (SWITCHES,) of a new workspace: what the scene decides once."""
-    switches = np.zeros(SWITCHES, np.int64)
+def set_switches(model, switches):
+    """Set the switches (SWITCHES,) of a new workspace, zeros before: what the scene decides once."""
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
     switches[DAMPED] = 1 if is_damped(model) else 0
     switches[THOROUGH] = 1
@@ -30,7 +29,6 @@ def switches_of(model):
     for j in range(model.response.shape[0]):
         if model.response[j, KIND] == ENERGY:
             switches[STORED] = 1
-    return switches
 
 
 @kernel
@@ -64,9 +62,16 @@ def is_damped(model):
 
 @kernel
 def carriers(model):
-    """(n_pair,) which bodies move, as of `movers`, where members, bushings or contacts act between them; 0 where only
-    joints do."""
+    """(n_pair,) which bodies move, as of `movers_of`, where members, bushings or contacts act between them; 0 where
+    only joints do."""
     found = np.zeros(model.pair.shape[0], np.int64)
+    set_carriers(model, found)
+    return found
+
+
+@kernel
+def set_carriers(model, found):
+    """Set found (n_pair,), zeros before, to what `carriers` returns."""
     for k in range(model.block.shape[0]):
         found[model.block[k, PAIR]] = 1
     for j in range(model.bushing_pair.shape[0]):
@@ -74,22 +79,12 @@ def carriers(model):
     for j in range(model.contact_pair.shape[0]):
         found[model.contact_pair[j]] = 1
     for p in range(found.shape[0]):
-        found[p] *= _movers_of(model, p)
-    return found
-
-
-@kernel
-def movers(model):
-    """(n_pair,) which bodies of a pair move: BOTH, or FIRST or SECOND alone."""
-    found = np.empty(model.pair.shape[0], np.int64)
-    for p in range(found.shape[0]):
-        found[p] = _movers_of(model, p)
-    return found
+        found[p] *= movers_of(model, p)
 
 
 @part
-def _movers_of(model, p):
-    """`movers` of one pair."""
+def movers_of(model, p):
+    """Which bodies of pair p move: BOTH, or FIRST or SECOND alone."""
     each = freedoms(model)
     first = 0
     second = 0

@@ -57,12 +57,12 @@ def finished(model, tables, member_state, history, count, work):
     n_row = model.size[0]
     # few arrays with many rows: each of its own would take as long as a short step
     places = np.empty((4, n_q))
-    vectors = np.zeros((8, n))
+    vectors = np.zeros((12, n))
     multipliers = np.zeros((3, n_row))
     return Motion(
         model, tables, member_state, history, count, work, make_workspace(model), places[0], vectors[0], vectors[1],
         multipliers[0], vectors[2:5], multipliers[1], places[1], vectors[5:8], multipliers[2], places[2:4],
-        np.empty((2, 2, n)),
+        vectors[8:].reshape((2, 2, n)),
     )  # fmt: skip
 
 

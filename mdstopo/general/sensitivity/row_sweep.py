@@ -57,13 +57,34 @@ def make_units(model, rows, columns):
 
     columns: M_padded + P.
     """
-    n = model.mass.shape[0]
     place = free_places(model)
     many = 2 * place.shape[0] if rows > 2 * place.shape[0] else 0
-    both = np.empty((2, many, n))
+    units = _carve_units(
+        place, np.empty(many * (21 * model.mass.shape[0] + count_sets(model) + columns + 1)), many,
+        model.mass.shape[0], count_sets(model), columns,
+    )  # fmt: skip
+    units.lam_x[:] = 0.0
+    units.fraction[:] = 1.0
+    return units
+
+
+@kernel
+def _carve_units(place, room, many, n, slots, columns):
+    """`Units` whose other arrays lie behind each other in `room`, as most sweeps have none of them.
+
+    place: of `Units`. room (many (21 n + slots + columns + 1),). many, n, slots, columns: U, freedoms of all bodies,
+    permanent sets, M_padded + P.
+    """
+    lam_v = many * n
+    lam_x = 2 * lam_v
+    z = 4 * lam_v
+    bar_set = 21 * lam_v
+    out = bar_set + many * slots
+    fraction = out + many * columns
     return Units(
-        place, both[0], both[1], np.zeros((many, 2, n)), np.empty((many, count_sets(model))),
-        np.empty((many, 17, n)), np.empty((many, columns)), np.ones(many),
+        place, room[:lam_v].reshape((many, n)), room[lam_v:lam_x].reshape((many, n)),
+        room[lam_x:z].reshape((many, 2, n)), room[bar_set:out].reshape((many, slots)),
+        room[z:bar_set].reshape((many, 17, n)), room[out:fraction].reshape((many, columns)), room[fraction:],
     )  # fmt: skip
 
 
