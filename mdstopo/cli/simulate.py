@@ -22,6 +22,7 @@ from mdstopo.cli.options import (
     set_option,
 )
 from mdstopo.cli.output import Output, duration, number
+from mdstopo.cli.values_of_motion import Values, document_of, rows_of, values_of
 from mdstopo.shown import counted
 
 if TYPE_CHECKING:
@@ -49,6 +50,8 @@ def command(
     quiet: bool,
 ) -> int:
     """Compute the motion of one design in every load case and write it to a file.
+
+    Objectives and constraints of these load cases are printed, too; of an uncertain case the nominal ones.
     \f
     Arguments, which --help leaves out:
 
@@ -83,6 +86,7 @@ def command(
         ended = time.perf_counter()
         rests = {name: engine.settled(alpha, name) for name in chosen}
         failed = [motion for motion in motions.values() if motion.status is not Status.OK]
+        values = Values({}, {}) if failed else values_of(case, engine, alpha, chosen)
         status = RunStatus.FAILED if failed else RunStatus.CONVERGED
         reason = f"{failed[0].status.value}: {failed[0].message}" if failed else "done"
         file.write(
@@ -98,6 +102,7 @@ def command(
             output.say(f"  {rests[name]}")
     output.table(
         [
+            *rows_of(case, values),
             ["integrator", f"{engine.integrator}: {engine.integrator_reason}"],
             ["time", f"{duration(ended - ready)}, {duration(ready - began)} to get ready"],
             ["result", str(path)],
@@ -110,6 +115,7 @@ def command(
             "status": status.value,
             "reason": reason,
             "load_cases": {name: _motion_document(case, motion, rests[name]) for name, motion in motions.items()},
+            **document_of(case, values),
             "integrator": engine.integrator,
             "seconds": ended - ready,
             "compile_seconds": ready - began,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.response_units import constrained, unit_of_bound
 from mdstopo.case.stages import stage_count
 from mdstopo.case.words import count_text
 from mdstopo.evaluators import make_engine
@@ -499,9 +500,10 @@ class _Run:
             return status, reason
         row = self.case.constraints[i]
         word = {"limit": "above its limit", "at_least": "below its least", "equals": "away from its"}[row.sense]
+        unit = unit_of_bound(row)
         sentence = (
-            f"no design was found that keeps the constraints: constraints[{i}] is {abs(self.constraints[i]):.6g} "
-            f"{word} {row.bound:.6g}"
+            f"no design was found that keeps the constraints: constraints[{i}] ({constrained(self.case, row)}) is "
+            f"{f'{abs(self.constraints[i]):.6g} {unit}'.rstrip()} {word} {f'{row.bound:.6g} {unit}'.rstrip()}"
         )
         if row.bound == 0.0:  # the optimiser takes it as it is
             reason = reason.replace(" of its bound", "")
