@@ -31,10 +31,8 @@ def test_a_run_that_finds_no_feasible_design_fails_and_names_the_constraint(caps
     Path("probe.yaml").write_text(single().replace("equals: 7.2}", "equals: 7.2}" + LIMIT))
     status = run_group(["run", "probe.yaml", "--json"])
     content = json.loads(capsys.readouterr().out)
-    assert (
-        "no design was found that keeps the constraints: constraints[1] (max displacement of torso relative to vehicle, rotation) is"
-        in content["reason"]
-    )
+    what = "max displacement of torso relative to vehicle, rotation"
+    assert f"no design was found that keeps the constraints: constraints[1] ({what}) is" in content["reason"]
     # which of the two, and why, is a matter of rounding here
     assert (status, content["status"]) in ((1, "failed"), (1, "max_iterations"))
     assert content["constraints"][1] > 0.0
