@@ -75,6 +75,7 @@ def command(
         announce_compilation(output, case)
         from mdstopo.engine import Evaluator
         from mdstopo.session.coarse_steps import coarse_steps
+        from mdstopo.session.near_zero import near_zero
         from mdstopo.status import RunStatus, Status
         from mdstopo.store.contents import design_part, trajectory_part
 
@@ -122,7 +123,7 @@ def command(
             "path": str(path),
         }
     )
-    for warning in filter(None, (coarse_steps(case, *each) for each in motions.items())):
+    for warning in filter(None, (*(coarse_steps(case, *each) for each in motions.items()), near_zero(case, engine))):
         output.notice(f"warning: {warning}")
     return 1 if failed else 0
 
