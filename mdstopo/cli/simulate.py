@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mdstopo.cli.long_motion import FIRST, told_while
 from mdstopo.cli.options import (
     alpha_option,
     announce_compilation,
@@ -83,10 +84,15 @@ def command(
         engine = Evaluator(case)
         check_design(engine, alpha, alpha_path)
         ready = time.perf_counter()
-        motions = {name: engine.trajectory(alpha, name) for name in chosen}
+        motions = {}
+        for name in chosen:
+            with told_while(output.notice, case, engine, alpha, name):
+                motions[name] = engine.trajectory(alpha, name)
         ended = time.perf_counter()
         rests = {name: engine.settled(alpha, name) for name in chosen}
         failed = [motion for motion in motions.values() if motion.status is not Status.OK]
+        if ended - ready > FIRST and not failed and (case.objectives or case.constraints):
+            output.notice(f"objectives and constraints: about {duration(ended - ready)} more")
         values = Values({}, {}) if failed else values_of(case, engine, alpha, chosen)
         status = RunStatus.FAILED if failed else RunStatus.CONVERGED
         reason = f"{failed[0].status.value}: {failed[0].message}" if failed else "done"
