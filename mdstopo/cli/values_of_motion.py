@@ -29,13 +29,15 @@ class Values:
 def values_of(case: "Case", engine: "Evaluator", design: "FloatArray", load_cases: Sequence[str]) -> Values:
     """Values of what looks at these load cases, and of volumes, with a design (N + P,); of the case as it is written
     where numbers are uncertain."""
+    from mdstopo.case.model import ResponseRow, VolumeRow
     from mdstopo.engine import Evaluator
     from mdstopo.scene.moving_volumes import spent
 
     design = engine.design(design)
-    volumes = {i: spent(case, row, design) for i, row in enumerate(case.constraints) if _is_volume(row)}
+    stated = list(enumerate(case.constraints))
+    volumes = {i: spent(case, row, design) for i, row in stated if isinstance(row, VolumeRow)}
     objectives = tuple(each for each in case.objectives if each.load_case in load_cases)
-    rows = {i: row for i, row in enumerate(case.constraints) if not _is_volume(row) and row.load_case in load_cases}
+    rows = {i: row for i, row in stated if isinstance(row, ResponseRow) and row.load_case in load_cases}
     if not objectives and not rows:
         return Values({}, volumes)
     if set(load_cases) != {each.name for each in case.load_cases}:
@@ -52,12 +54,6 @@ def values_of(case: "Case", engine: "Evaluator", design: "FloatArray", load_case
         {each.name: (found.objectives[each.name], found.peak_times[each.name]) for each in objectives},
         dict(sorted(constraints.items())),
     )
-
-
-def _is_volume(row: "VolumeRow | ResponseRow") -> bool:
-    from mdstopo.case.model import VolumeRow
-
-    return isinstance(row, VolumeRow)
 
 
 def is_kept(row: "VolumeRow | ResponseRow", value: float, tolerance: float) -> bool:

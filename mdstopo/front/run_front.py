@@ -357,7 +357,7 @@ class _FrontRun:
             if each.point >= 0 and each.usable and each.iterate < 0:
                 best.setdefault(each.point, each)
         at_once = self.pool.at_once if self.pool is not None else 1
-        each = mean / max(at_once, 1)
+        pace = mean / max(at_once, 1)
         to_come = self.expected - len(done) - len(running)
         self.on_progress(
             Snapshot(
@@ -367,8 +367,8 @@ class _FrontRun:
                 tuple(sorted({point for point in list(running.values())[: at_once or None] if point >= 0})),
                 len(done),
                 sum(each.evaluations for each in done),
-                len(running) * each,
-                to_come * each if to_come > 0 else float("nan"),
+                len(running) * pace,
+                to_come * pace if to_come > 0 else float("nan"),
             )
         )
 

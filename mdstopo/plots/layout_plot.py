@@ -148,9 +148,10 @@ def draw_bodies(axis: Any, case: Case, q: Floats, faint: float = 1.0) -> None:
 
 def _ground(axis: Any, case: Case) -> None:
     """The symbol of ground at its points that are on no line, where they are few; below that of a joint or bushing."""
+    ties: list[Any] = [*case.joints, *case.bushings]
     tied = {
         tuple(float(x) for x in at)
-        for tie in (*case.joints, *case.bushings)
+        for tie in ties
         for body, at in zip(tie.bodies, (tie.at_first, tie.at_second), strict=True)
         if body == GROUND
     }

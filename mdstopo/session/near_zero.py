@@ -23,9 +23,9 @@ def near_zero(case: Case, engine: object) -> str:
     if not isinstance(engine, Evaluator) or not engine.beyond:
         return ""
     for name in engine.scenes:
-        aims = [each for each in case.objectives if each.load_case == name]
-        rows = [each for each in case.constraints if isinstance(each, ResponseRow) and each.load_case == name]
-        integrals = [(j, aim) for j, aim in enumerate((*aims, *rows)) if REDUCTIONS[aim.over_time].is_integral]
+        aims: list[Objective | ResponseRow] = [each for each in case.objectives if each.load_case == name]
+        aims += [each for each in case.constraints if isinstance(each, ResponseRow) and each.load_case == name]
+        integrals = [(j, aim) for j, aim in enumerate(aims) if REDUCTIONS[aim.over_time].is_integral]
         if not integrals:
             continue
         driver = engine.driver(name)
