@@ -314,7 +314,7 @@ class Record(Value):
     one of these; never_both: pairs; needs: a key -> the one that must stand beside it. more: keys of other
     distributions, each of which stands for one of the first set of `one_of`. elsewhere: an unknown key -> where it
     would be right, or what stands in its place here. unit_of: the unit of keys that state none, by what else the
-    mapping has.
+    mapping has. alone: words that may stand in the place of the whole mapping, for messages.
     """
 
     what: str
@@ -327,6 +327,7 @@ class Record(Value):
     more: Brought[Key] | None = None
     elsewhere: tuple[tuple[str, str], ...] = ()
     unit_of: Callable[[Node], str] | None = None
+    alone: tuple[str, ...] = ()
 
     @property
     def all_keys(self) -> tuple[Key, ...]:
@@ -390,9 +391,13 @@ class Record(Value):
             if best is not None:
                 meant.add(best)
                 hint = f", did you mean {best!r}?"
-            message = f"unknown key {shown(text)}{hint or ','} allowed are {listed(known)}"
+            message = f"unknown key {shown(text)}{hint or ','} allowed are {listed(known)}{self._or_alone()}"
             reading.mistake(inside(path, text), message, key)
         return meant
+
+    def _or_alone(self) -> str:
+        """That words may stand in the place of the mapping, for the end of a message."""
+        return f", or in the place of the mapping {listed(self.alone)}" if self.alone else ""
 
     def _together(self, fields: Fields, meant: set[str], path: str, reading: Reading) -> None:
         """Which keys go with which."""
@@ -403,7 +408,7 @@ class Record(Value):
                 continue
             if here or not meant & set(names):
                 what = f"found {' and '.join(here)}" if here else "found none"
-                reading.mistake(path, f"{what}, needed is exactly one of {listed(names)}")
+                reading.mistake(path, f"{what}, needed is exactly one of {listed(names)}{self._or_alone()}")
             fields.update(dict.fromkeys(names, BAD))
         if self.any_of and not given & set(self.any_of):
             if not meant & set(self.any_of):

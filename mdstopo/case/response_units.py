@@ -1,8 +1,16 @@
 """Units of responses, for axes and attributes."""
 
-from mdstopo.case.aims import Objective, Response, ResponseRow
+from typing import TYPE_CHECKING
+
+from mdstopo.case.aims import Objective, Response, ResponseRow, VolumeRow
 from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.responses import kind_of
+
+if TYPE_CHECKING:
+    from mdstopo.case.model import Case
+
+#: how a constraint bounds its value, in words
+BOUNDED = {"limit": "at most", "equals": "equal to", "at_least": "at least"}
 
 
 def unit_of(response: Response) -> str:
@@ -30,3 +38,21 @@ def words(response: Response) -> str:
     if response.since == "settled":
         parts.append("since it has settled")
     return " ".join(parts)
+
+
+def constrained(case: "Case", row: VolumeRow | ResponseRow) -> str:
+    """What a constraint bounds, in words: `volume of belts`, `max displacement x of torso, braking`."""
+    if isinstance(row, VolumeRow):
+        return f"volume of {', '.join(row.groups)}"
+    where = f", {row.load_case}" if len(case.load_cases) > 1 else ""
+    return f"{row.over_time} {words(row.response)}{where}"
+
+
+def unit_of_bound(row: VolumeRow | ResponseRow) -> str:
+    """The unit of a constraint's value; empty of a volume, and of an expression whose unit the case does not state."""
+    return "" if isinstance(row, VolumeRow) else unit_of_value(row).removeprefix("-")
+
+
+def bounded(row: VolumeRow | ResponseRow) -> str:
+    """The bound of a constraint, in words: `at most 0.1 m`."""
+    return f"{BOUNDED[row.sense]} {row.bound:.9g} {unit_of_bound(row)}".rstrip()

@@ -13,16 +13,16 @@ from mdstopo.case.aims import Response
 from mdstopo.case.distributions import Brought
 from mdstopo.case.expression_response import expression_keys, make_expression
 from mdstopo.case.joints.joint import PAIR
-from mdstopo.case.kinds import Ref, explained
+from mdstopo.case.kinds import Ref, Word, explained
 from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
-from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.reading import BAD, Fields, Reading, found
 from mdstopo.case.records import ByShape, Key, Record
 from mdstopo.case.schema_frame import FRAME
 from mdstopo.case.schema_scene import BODY, GROUP, IN_SPACE
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import inside, shown
+from mdstopo.case.words import inside, listed, shown
 
 Made = Callable[[str, Fields, Frames, Reading], Response | None]
 
@@ -181,6 +181,26 @@ def enter_response(kind: Any) -> Key:
 OF_OTHERS = Brought("mdstopo.responses", enter_response)
 
 
+#: words for material, which is bounded, and what is said of them as a response or an objective
+MATERIAL = ("volume", "mass", "material")
+NO_RESPONSE = (
+    "material is no `response` of the motion but a sum over the design, which a constraint bounds, such as "
+    "{volume: all, limit: 10}; how the least of it is found that keeps a limit, docs/least-material.md tells"
+)
+
+
+@frozen
+class _WordAlone(Word):
+    """The kind of a response that is a word alone; material is told where it belongs."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """The word at a node of the file, or BAD with a mistake noted."""
+        if node.scalar() not in MATERIAL:
+            return Word(self.words, self.instead, self.meanings).read(node, path, reading)
+        reading.mistake(path, f"found {found(node)}: {NO_RESPONSE}", node)
+        return BAD
+
+
 def response_kinds(
     kinds: Mapping[str, ResponseKind], elsewhere: tuple[tuple[str, str], ...], more: Brought[Key] | None = None
 ) -> ByShape:
@@ -190,15 +210,18 @@ def response_kinds(
     distributions.
     """
     worded = tuple(kind.word for kind in kinds.values() if kind.keys is not None)
+    alone = {kind.word: kind.doc for kind in kinds.values() if kind.keys is None}
+    mapping = f" | a mapping {{word: ...}} with one of the words {listed(worded)}"
     return ByShape(
-        "energy | a mapping such as {displacement: {body: b}}",
-        scalar=explained(
-            {kind.word: kind.doc for kind in kinds.values() if kind.keys is None},
-            " | a mapping such as {displacement: {body: b}}",
-        ),
+        f"{' | '.join(alone)}{mapping}",
+        scalar=_WordAlone(tuple(alone), mapping, tuple(alone.values())),
         mapping=Record(
             "a response", tuple(key_of(kinds[word]) for word in worded), one_of=(worded,), doc="Exactly one of these.",
-            more=more, elsewhere=elsewhere,
+            more=more, alone=tuple(alone),
+            elsewhere=(
+                *elsewhere, *((word, NO_RESPONSE) for word in MATERIAL),
+                *((word, f"it stands alone: `response: {word}`") for word in alone),
+            ),
         ),
     )  # fmt: skip
 

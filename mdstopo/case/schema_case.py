@@ -31,7 +31,15 @@ from mdstopo.case.over_time import DEFAULT_REDUCTION
 from mdstopo.case.over_time import names as reductions
 from mdstopo.case.reading import Reading
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
-from mdstopo.case.responses import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
+from mdstopo.case.responses import (
+    IN_SPACE_ALONE,
+    MATERIAL,
+    NO_RESPONSE,
+    OF_OTHERS,
+    RESPONSES,
+    response_kinds,
+    unit_stated,
+)
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_fit import fit_record
 from mdstopo.case.schema_scene import (
@@ -224,6 +232,7 @@ OBJECTIVE = Record(
         Key("sense", _SENSE, "which way is better", default="minimize"),
     ),
     doc="What is to be improved: a response, made a number.",
+    elsewhere=tuple((word, NO_RESPONSE) for word in MATERIAL),
 )
 COMBINE = Record(
     "how objectives are combined",

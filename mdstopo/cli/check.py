@@ -110,6 +110,7 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
     from mdstopo.cli.check_numbers import frequencies
 
     document: dict[str, Any] = {"uncertainty": say_sample(output, case)}
+    _say_what_stays_open(output, case)
     announce_compilation(output, case)
     from mdstopo.evaluators import evaluator_of
     from mdstopo.session.compiling_apart import STEPS, compiling_in_background
@@ -138,6 +139,15 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
     document |= {"frequencies": found, "skipped": engine.skipped, "integrator": integrator}
     document["evaluation"] = _say_cost(output, case, engine)
     return document
+
+
+def _say_what_stays_open(output: Output, case: "Case") -> None:
+    """Say before kernels are compiled, which takes a minute, what will not be known even then."""
+    from mdstopo.cli.check_cost import UNKNOWN
+    from mdstopo.warm import compilation_due
+
+    if case.objectives and compilation_due(case):
+        output.notice(f"what one evaluation costs will be {UNKNOWN}; frequencies and freedoms need fewer")
 
 
 def _say_cost(output: Output, case: "Case", engine: "Evaluator") -> dict[str, Any] | None:

@@ -11,6 +11,10 @@ if TYPE_CHECKING:
 
 #: an evaluation that took longer than this (s) is not made once more, to leave out what is only done the first time
 ONCE = 2.0
+#: what is said where kernels would have to be compiled
+UNKNOWN = (
+    "not known: kernels that it needs have not been compiled here yet; the first `gradient` or `run` compiles them"
+)
 
 
 def cost(case: "Case", engine: "Evaluator") -> dict[str, Any] | None:
@@ -52,7 +56,7 @@ def cost(case: "Case", engine: "Evaluator") -> dict[str, Any] | None:
 def in_words(found: dict[str, Any] | None) -> str:
     """The result of `cost` as a sentence."""
     if found is None:
-        return "not known: kernels that it needs have not been compiled here yet"
+        return UNKNOWN
     if "message" in found:
         return f"fails at the start: {found['message']}"
     each = f"{counted(found['steps'], 'step')}, {counted(found['force_sums'], 'force sum')}"

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from mdstopo.case.arrays import Signal, TimeFormula
 from mdstopo.case.columns import point_columns
 from mdstopo.case.model import GROUND, Case, Contact, SpringLaw, SurfaceContact, Table, VolumeRow
+from mdstopo.case.response_units import BOUNDED
 from mdstopo.cli.output import number
 from mdstopo.scene.bodies import placed
 
@@ -73,7 +74,6 @@ def body_rows(case: Case) -> list[list[str]]:
 
 def material(case: Case) -> list[list[str]]:
     """The volume rows, and what designs make of them."""
-    words = {"limit": "at most", "equals": "equal to", "at_least": "at least"}
     rows = []
     for row in case.constraints:
         if isinstance(row, VolumeRow):
@@ -81,7 +81,7 @@ def material(case: Case) -> list[list[str]]:
                 row.bound,
                 *(row.spent(x) for x in (case.start, *_bounds(case))),
             )
-            rows.append([", ".join(row.groups), words[row.sense], *(number(value) for value in values)])
+            rows.append([", ".join(row.groups), BOUNDED[row.sense], *(number(value) for value in values)])
     return rows
 
 

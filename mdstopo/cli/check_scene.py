@@ -157,16 +157,24 @@ def _mover(case: Case, shape: Floats, bodies: tuple[str, ...]) -> str:
     return words[int(np.argmax(energies))]
 
 
+def fastest_mover(case: Case, modes: Modes, bodies: tuple[str, ...]) -> tuple[float, str] | None:
+    """The fastest vibration about the start, rad/s, and the body that has most of it; None where nothing vibrates."""
+    fastest = float(modes.squares.max(initial=0.0))
+    if fastest <= modes.least:
+        return None
+    return float(np.sqrt(fastest)), _mover(case, modes.shapes[:, int(modes.squares.argmax())], bodies)
+
+
 def long_step(case: Case, modes: Modes, bodies: tuple[str, ...]) -> str:
     """Why a fixed step is too long for the fastest vibration about the start, by name; nothing where it is not."""
-    step, fastest = case.solver.step, float(modes.squares.max(initial=0.0))
-    if step is None or fastest <= modes.least:
+    step, found = case.solver.step, fastest_mover(case, modes, bodies)
+    if step is None or found is None:
         return ""
-    period = 2.0 * np.pi / np.sqrt(fastest)
+    rate, mover = found
+    period = 2.0 * np.pi / rate
     if period >= FEWEST * step:
         return ""
-    mover = _mover(case, modes.shapes[:, int(modes.squares.argmax())], bodies)
     return (
         f"solver.step of {number(step)} s is {number(period / step, 2)} to a period of the fastest vibration, "
-        f"{number(np.sqrt(fastest), 4)} rad/s ({mover}); where it matters, take at most {number(period / FEWEST, 2)} s"
+        f"{number(rate, 4)} rad/s ({mover}); where it matters, take at most {number(period / FEWEST, 2)} s"
     )

@@ -171,16 +171,10 @@ def _range(values: list[float]) -> str:
 
 def _constraint(case: "Case", i: int) -> str:
     """A constraint and its bound in words."""
-    from mdstopo.case.model import VolumeRow
-    from mdstopo.case.response_units import words
+    from mdstopo.case.response_units import constrained
 
     row = case.constraints[i]
-    if isinstance(row, VolumeRow):
-        what = f"volume of {', '.join(row.groups)}"
-    else:
-        what = f"{row.over_time} {words(row.response)}"
-        what += f", {row.load_case}" if len(case.load_cases) > 1 else ""
-    return f"{what} {_SIGNS[row.sense]} {number(row.bound, 9)}"
+    return f"{constrained(case, row)} {_SIGNS[row.sense]} {number(row.bound, 9)}"
 
 
 def _trouble(column: Any) -> str:

@@ -42,15 +42,18 @@ def line(snapshot: "Snapshot") -> str:
     total = len(snapshot.directions)
     return (
         f"{len(snapshot.best)} of {total} points have a design, {len(snapshot.running)} are worked on; "
-        f"{snapshot.done} solves, {snapshot.evaluations} evaluations, {_left(snapshot.left)}"
+        f"{snapshot.done} solves, {snapshot.evaluations} evaluations, {_left(snapshot.left, snapshot.more)}"
     )
 
 
-def _left(seconds: float) -> str:
-    """The time that is left in words, where it is known."""
-    if math.isnan(seconds):
+def _left(due: float, more: float) -> str:
+    """The time that is left in words: of what is due, and of what may follow it, where anything is known of either."""
+    if math.isnan(due):
         return "time left not known"
-    return f"about {duration(seconds)} left" if seconds >= _SOON else f"less than {duration(_SOON)} left"
+    words = f"about {duration(due)} left" if due >= _SOON else f"less than {duration(_SOON)} left"
+    if math.isnan(more):
+        return f"{words} of this round"
+    return f"{words} of this round, {duration(more)} where more are needed" if more >= _SOON else words
 
 
 def picture(snapshot: "Snapshot") -> "Table":

@@ -225,7 +225,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     import numpy as np
 
     from mdstopo.case.model import VolumeRow
-    from mdstopo.case.response_units import words
+    from mdstopo.case.response_units import bounded, constrained
     from mdstopo.case.words import count_text
     from mdstopo.cli.show import values_text
     from mdstopo.scene.moving_volumes import spent
@@ -234,17 +234,13 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     case, lines = outcome.case, []
     for i, (row, excess) in enumerate(zip(case.constraints, outcome.constraints.tolist(), strict=True)):
         if not isinstance(row, VolumeRow):
-            word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
-            found = f"{number(excess + row.bound, 9)}, {word} {number(row.bound, 9)}"
-            where = f", {row.load_case}" if len(case.load_cases) > 1 else ""
-            lines.append((f"{row.over_time} {words(row.response)}{where}", found))
+            lines.append((constrained(case, row), f"{number(excess + row.bound, 9)}, {bounded(row)}"))
             lines += [(title, sentence) for title, sentence in lines_of(outcome.conclusion, f"constraints[{i}]")]
         else:
             design = np.concatenate([outcome.alpha, *outcome.variables.values()])
             chosen = outcome.sizes is not None and bool(outcome.sizes.sizes)
             used = spent(case, row, at_prices(case, design) if chosen else design)
-            word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
-            lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))
+            lines.append((constrained(case, row), f"{number(used, 9)}, {bounded(row)}"))
     width = case.upper - case.lower
     # A member whose bounds are equal is as much there as they say.
     share = np.divide(outcome.alpha - case.lower, width, out=np.array(outcome.alpha), where=width > 0.0)

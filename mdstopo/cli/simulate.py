@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mdstopo.cli.long_motion import FIRST, told_while
 from mdstopo.cli.options import (
     alpha_option,
     announce_compilation,
@@ -22,6 +23,7 @@ from mdstopo.cli.options import (
     set_option,
 )
 from mdstopo.cli.output import Output, duration, number
+from mdstopo.cli.values_of_motion import Values, document_of, rows_of, values_of
 from mdstopo.shown import counted
 
 if TYPE_CHECKING:
@@ -49,6 +51,8 @@ def command(
     quiet: bool,
 ) -> int:
     """Compute the motion of one design in every load case and write it to a file.
+
+    Objectives and constraints of these load cases are printed, too; of an uncertain case the nominal ones.
     \f
     Arguments, which --help leaves out:
 
@@ -72,6 +76,7 @@ def command(
         announce_compilation(output, case)
         from mdstopo.engine import Evaluator
         from mdstopo.session.coarse_steps import coarse_steps
+        from mdstopo.session.near_zero import near_zero
         from mdstopo.status import RunStatus, Status
         from mdstopo.store.contents import design_part, trajectory_part
 
@@ -79,10 +84,16 @@ def command(
         engine = Evaluator(case)
         check_design(engine, alpha, alpha_path)
         ready = time.perf_counter()
-        motions = {name: engine.trajectory(alpha, name) for name in chosen}
+        motions = {}
+        for name in chosen:
+            with told_while(output.notice, case, engine, alpha, name):
+                motions[name] = engine.trajectory(alpha, name)
         ended = time.perf_counter()
         rests = {name: engine.settled(alpha, name) for name in chosen}
         failed = [motion for motion in motions.values() if motion.status is not Status.OK]
+        if ended - ready > FIRST and not failed and (case.objectives or case.constraints):
+            output.notice(f"objectives and constraints: about {duration(ended - ready)} more")
+        values = Values({}, {}) if failed else values_of(case, engine, alpha, chosen)
         status = RunStatus.FAILED if failed else RunStatus.CONVERGED
         reason = f"{failed[0].status.value}: {failed[0].message}" if failed else "done"
         file.write(
@@ -98,6 +109,7 @@ def command(
             output.say(f"  {rests[name]}")
     output.table(
         [
+            *rows_of(case, values),
             ["integrator", f"{engine.integrator}: {engine.integrator_reason}"],
             ["time", f"{duration(ended - ready)}, {duration(ready - began)} to get ready"],
             ["result", str(path)],
@@ -110,13 +122,14 @@ def command(
             "status": status.value,
             "reason": reason,
             "load_cases": {name: _motion_document(case, motion, rests[name]) for name, motion in motions.items()},
+            **document_of(case, values),
             "integrator": engine.integrator,
             "seconds": ended - ready,
             "compile_seconds": ready - began,
             "path": str(path),
         }
     )
-    for warning in filter(None, (coarse_steps(case, *each) for each in motions.items())):
+    for warning in filter(None, (*(coarse_steps(case, *each) for each in motions.items()), near_zero(case, engine))):
         output.notice(f"warning: {warning}")
     return 1 if failed else 0
 

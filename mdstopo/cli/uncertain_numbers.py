@@ -69,6 +69,7 @@ def say_sample(output: Output, case: "Case") -> dict[str, Any] | None:
     """What the sample of a case is; the same for machines."""
     if case.uncertainty is None:
         return None
+    from mdstopo.case.response_units import constrained
     from mdstopo.robust.sample import design_sample
 
     uncertain, sample = case.uncertainty, design_sample(case.uncertainty)
@@ -90,6 +91,7 @@ def say_sample(output: Output, case: "Case") -> dict[str, Any] | None:
         told_of = [[each.name, number(each.probability), ", ".join(each.values)] for each in uncertain.scenarios]
         output.table([["scenario", "probability", "sets"], *told_of])
     measures = [[name, measure.words] for name, measure in uncertain.objectives.items()]
-    measures += [[f"constraints[{i}]", measure.words] for i, measure in uncertain.constraints.items()]
+    for i, measure in uncertain.constraints.items():
+        measures.append([f"constraints[{i}] ({constrained(case, case.constraints[i])})", measure.words])
     output.table([["objective or constraint", "measure"], *measures])
     return {"points": len(sample), "numbers": told, "scenarios": [each.name for each in uncertain.scenarios]}

@@ -24,6 +24,7 @@ from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reader import measured
 from mdstopo.case.reading import Reading
+from mdstopo.case.response_units import constrained
 from mdstopo.case.start_geometry import Frames, frames_of
 from mdstopo.case.words import inside
 from mdstopo.finalize.apart import free_name
@@ -322,7 +323,7 @@ def _constraints(
             if len(versions) == 1 or (versions and row.sense == "limit" and REDUCTIONS[row.over_time].is_largest):
                 found += versions
             else:
-                told.append(f"constraints[{i}] is left out: {_reason(versions)}")
+                told.append(f"constraints[{i}] ({constrained(case, row)}) is left out: {_reason(versions)}")
             continue
         volume = entry["volume"]
         named = sized if volume == "all" else [volume] if isinstance(volume, str) else volume
@@ -331,7 +332,7 @@ def _constraints(
             bound = bound_of(row, case.n_design, design)
             found.append({"volume": "all" if volume == "all" else names, row.sense: bound})
         else:
-            told.append(f"constraints[{i}] is left out: {_empty(row)}")
+            told.append(f"constraints[{i}] ({constrained(case, row)}) is left out: {_empty(row)}")
     return found
 
 

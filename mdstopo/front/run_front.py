@@ -67,7 +67,9 @@ class Ask:
 class Snapshot:
     """How far a front has come: best by point, points that are being worked on, tasks done.
 
-    left: seconds that are left, a guess; NaN where there is none, because more tasks than usual have been needed.
+    left: seconds that the solves will take which are still due, by the mean of those before; NaN before the first.
+    more: the same of those that a front usually needs after these. Whether it will is known when these are done; NaN
+    where it has needed more than usual already.
     """
 
     directions: Floats
@@ -77,6 +79,7 @@ class Snapshot:
     done: int
     evaluations: int
     left: float
+    more: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -354,7 +357,8 @@ class _FrontRun:
             if each.point >= 0 and each.usable and each.iterate < 0:
                 best.setdefault(each.point, each)
         at_once = self.pool.at_once if self.pool is not None else 1
-        to_come = self.expected - len(done)
+        pace = mean / max(at_once, 1)
+        to_come = self.expected - len(done) - len(running)
         self.on_progress(
             Snapshot(
                 self.ask.directions,
@@ -363,7 +367,8 @@ class _FrontRun:
                 tuple(sorted({point for point in list(running.values())[: at_once or None] if point >= 0})),
                 len(done),
                 sum(each.evaluations for each in done),
-                max(to_come, len(running)) * mean / max(at_once, 1) if to_come > 0 else float("nan"),
+                len(running) * pace,
+                to_come * pace if to_come > 0 else float("nan"),
             )
         )
 

@@ -6,10 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mdstopo.case.laws.gap_law import GapLaw
+from mdstopo.case.model import MemberGroup
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.member_lines import MOST, NARROWEST, widest_of
 from mdstopo.plots.scenery import Floats, start_state
+from mdstopo.plots.slack import member_lines
 from mdstopo.plots.source import Source
 from mdstopo.plots.stage import Stage
 from mdstopo.plots.style import WIDTH, colour, ink, paper
@@ -126,13 +130,19 @@ def _lines(stage: Stage, thick: Thickness, states: Floats) -> list[tuple[str, Fl
     chosen, named = strongest(thick.shares, MOST), families(case)
     order, widest = list(dict.fromkeys(named)), 1.4 * widest_of(sum(len(each) for each in chosen))
     for group, share, some, family in zip(case.members, thick.shares, chosen, named, strict=True):
-        ends = np.stack([stage.ends(q)(group)[some] for q in states])
-        dash = "" if group.design else ' stroke-dasharray="5 3"'
+        ends = np.stack([_shown(stage, group, q, some) for q in states])
         for i, member in enumerate(some.tolist()):
             width = NARROWEST + (widest - NARROWEST) * float(share[member])
             own = colour(order.index(family))
-            found.append((f'fill="none" stroke="{own}" stroke-width="{width:.2f}"{dash}', ends[:, i]))
+            found.append((f'fill="none" stroke="{own}" stroke-width="{width:.2f}"', ends[:, i]))
     return found
+
+
+def _shown(stage: Stage, group: MemberGroup, q: Floats, some: NDArray[np.int64]) -> Floats:
+    """Lines (K, n, 2) of some (K,) members of a group at a state q: two ends, more of belts, which may hang through."""
+    if any(law.type == GapLaw.type for law in group.laws):
+        return member_lines(stage.case, group, q, stage.seen, some)[0]
+    return np.asarray(stage.ends(q)(group)[some])
 
 
 def _body_lines(stage: Stage, name: str) -> list[tuple[Floats, bool, float]]:

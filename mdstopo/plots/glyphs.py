@@ -47,6 +47,10 @@ _BLOCK_ARROW = _line((0, 1.5), (15, 1.5), (15, 4.5), (23, 0), (15, -4.5), (15, -
 _ZIGZAG = _line((-7, 0), (-5, 0), (-4, 3), (-2, -3), (0, 3), (2, -3), (4, 3), (5, 0), (7, 0))
 
 
+_BETWEEN_STOPS = (_line((-9, 0), (9, 0)), _line((-9, -4), (-9, 4)), _line((9, -4), (9, 4)))
+_DIAGONALS = (_line((-3.4, -3.4), (3.4, 3.4)), _line((-3.4, 3.4), (3.4, -3.4)))
+
+
 @cache
 def glyphs() -> dict[str, Glyph]:
     """By kind: those of joints have the joint's word."""
@@ -66,6 +70,10 @@ def glyphs() -> dict[str, Glyph]:
         "moment": Glyph((arc, head), "ink", "moment"),
         "motion": Glyph((_BLOCK_ARROW,), "paper", "prescribed motion"),
         "turning": Glyph((driven, _circle(1.2), driven_head), "paper", "prescribed rotation"),
+        "held": Glyph(_BETWEEN_STOPS, "", "held coordinate"),
+        "unturned": Glyph((_box(3.4, 3.4), *_DIAGONALS), "paper", "held rotation"),
         "gravity": Glyph((_line((0, 0), (14, 0)), _line((18, 0), (13, 2.2), (13, -2.2), (18, 0))), "ink", "gravity"),
         "ground": Glyph((_line((-5, 0), (6, 0)), *_HATCH), "", "ground"),
+        "ground below": Glyph(tuple(line - np.array([0.0, 4.0]) for line in (_line((-5, 0), (6, 0)), *_HATCH)), "",
+                              "ground"),
     }  # fmt: skip

@@ -1,6 +1,5 @@
 """The system: bodies, points, and members drawn by how much of them there is."""
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from mdstopo.case.model import GROUND, Case
 from mdstopo.plots.body_shapes import Shape, followed, planar_shapes
 from mdstopo.plots.glyphs import glyphs
-from mdstopo.plots.member_lines import draw_members
+from mdstopo.plots.member_lines import draw_members, legend_title
 from mdstopo.plots.scenery import edge_at, ends_at, own_points, start_state
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.space_layout import draw_space
@@ -48,7 +47,7 @@ def draw(
         draw_state(axis, source, q, thick, (load_case, t))
         if t is not None:
             axis.set_title(f"t = {t:g} s", loc="left")
-    add_legend(figure, axes[0], thick)
+    add_legend(figure, axes[0], case, thick)
     return figure
 
 
@@ -72,7 +71,7 @@ def _overlaid(
         axis.plot(*stage.seen(places).T, ":", color=ink("middle"), linewidth=0.7, zorder=1.7)
     told = ", ".join(f"{at:.3g}" for at, _ in panels if at is not None)
     axis.set_title(f"t = {told} s", loc="left")
-    add_legend(figure, axis, thick)
+    add_legend(figure, axis, case, thick)
     return figure
 
 
@@ -91,7 +90,7 @@ def draw_state(
     case = source.case
     draw_bodies(axis, case, q, faint)
     _contacts(axis, case, q)
-    draw_members(axis, source, partial(ends_at, case, q=q), thick)
+    draw_members(axis, source, q, lambda places: places, thick)
     axis.set_aspect("equal", adjustable="datalim")
     axis.set_xlabel("x, m")
     axis.set_ylabel("y, m")
@@ -110,10 +109,10 @@ def legend_entries(case: Case) -> int:
     return len(case.bodies) + (named if named <= MOST_NAMED else 0) + len(kinds) + bool(case.contacts)
 
 
-def add_legend(figure: Any, axis: Any, thick: Thickness) -> None:
+def add_legend(figure: Any, axis: Any, case: Case, thick: Thickness) -> None:
     """Add a legend of what is drawn, above the picture."""
     handles, labels = legend_handles(axis)
-    title = f"width: {thick.what}" if thick.what else None
+    title = legend_title(case, thick)
     figure.legend(handles, labels, loc="outside upper left", ncols=COLUMNS, title=title, alignment="left")
 
 
@@ -148,12 +147,19 @@ def draw_bodies(axis: Any, case: Case, q: Floats, faint: float = 1.0) -> None:
 
 
 def _ground(axis: Any, case: Case) -> None:
-    """The symbol of ground at its points that are on no line, where they are few."""
+    """The symbol of ground at its points that are on no line, where they are few; below that of a joint or bushing."""
+    ties: list[Any] = [*case.joints, *case.bushings]
+    tied = {
+        tuple(float(x) for x in at)
+        for tie in ties
+        for body, at in zip(tie.bodies, (tie.at_first, tie.at_second), strict=True)
+        if body == GROUND
+    }
     lines = [line for grid in case.points.values() if grid.body == GROUND for line in followed(grid.local)]
     drawn = {tuple(point) for line in lines for point in line.tolist()}
     loose = [point for point in np.unique(own_points(case, GROUND), axis=0) if tuple(point.tolist()) not in drawn]
     for place in loose if len(loose) <= MOST_GROUND else ():
-        draw_glyph(axis, glyphs()["ground"], place)
+        draw_glyph(axis, glyphs()["ground below" if tuple(place.tolist()) in tied else "ground"], place)
 
 
 def _shape(axis: Any, case: Case, name: str, shape: Shape, q: Floats, own: str, faint: float) -> None:

@@ -1,13 +1,12 @@
 """The system in space: front, top, side, all to one scale, and perspective."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.case.model import GROUND, Case
 from mdstopo.plots.glyphs import glyphs
-from mdstopo.plots.member_lines import draw_members
+from mdstopo.plots.member_lines import draw_members, legend_title
 from mdstopo.plots.scenery import Floats, ends_at, hull, points_of
 from mdstopo.plots.solids import Solid, solid
 from mdstopo.plots.source import Source
@@ -59,18 +58,14 @@ def draw_space(
             axis = figure.add_axes((x / inches[0], y / inches[1], width / inches[0], height / inches[1]))
             draw_frame(axis, view, np.array([width, height]) / scale, cloud)
             draw_scene(axis, source, view, q, solids)
-            draw_members(axis, source, _ends_seen(case, view, q), thick)
+            draw_members(axis, source, q, view.seen, thick)
             draw_symbols(axis, case, symbols(case, load_case, t), q, view.seen)
             words = name if t is None or name != "front" else f"{name}, t = {t:g} s"
             axis.set_title(words, loc="left")
     handles, labels = legend_handles(figure.axes[0])
-    title = f"width: {thick.what}" if thick.what else None
+    title = legend_title(case, thick)
     figure.legend(handles, labels, loc="upper left", ncols=columns, title=title, alignment="left", borderaxespad=0.3)
     return figure
-
-
-def _ends_seen(case: Case, view: View, q: Floats) -> Callable[[MemberGroup], Floats]:
-    return lambda group: view.seen(ends_at(case, group, q))
 
 
 _Places = list[dict[str, tuple[float, float, float, float]]]

@@ -61,7 +61,7 @@ class Stage:
         if self.case.dimension == 3:
             draw_frame(axis, self.view, np.array([1.4, 1.0]), self.cloud)
             draw_scene(axis, self.source, self.view, q, self.solids)
-            draw_members(axis, self.source, lambda group: self.view.seen(ends_at(self.case, group, q)), thick)
+            draw_members(axis, self.source, q, self.view.seen, thick)
             draw_symbols(axis, self.case, symbols(self.case, *shown), q, self.view.seen)
             return
         draw_state(axis, self.source, q, thick, shown, faint)

@@ -24,7 +24,7 @@ def draw_symbols(axis: Any, case: Case, found: list[Symbol], q: Floats, seen: Ca
     for symbol in found:
         at, way, end = placed(case, symbol, q)
         glyph = glyphs()[symbol.kind]
-        label = glyph.words if glyph.words not in named else None
+        label = glyph if glyph.words not in named else None
         named.add(glyph.words)
         here = seen(at[None])[0]
         if end is not None:
@@ -36,7 +36,7 @@ def draw_symbols(axis: Any, case: Case, found: list[Symbol], q: Floats, seen: Ca
             ends = seen(np.array([at, at + 0.01 * size * way]))
             flat = (ends[1] - ends[0]) / (0.01 * size)
             length = float(np.hypot(*flat))
-            if length < END_ON and symbol.kind in ("load", "motion"):
+            if length < END_ON and symbol.kind in ("load", "motion", "held"):
                 glyph = glyphs()["distance"]  # end on: a dot
             angle = float(np.arctan2(flat[1], flat[0]))
         if symbol.kind == "load":
@@ -53,7 +53,7 @@ def draw_glyph(
     angle: float = 0.0,
     scale: float = 1.0,
     mirrored: bool = False,
-    label: str | None = None,
+    label: Glyph | None = None,
 ) -> None:
     """One symbol in points, whatever the scale of the picture.
 
@@ -63,7 +63,7 @@ def draw_glyph(
     angle: of its direction, rad.
     scale: its size.
     mirrored: whether what turns counterclockwise turns clockwise.
-    label: for the legend; None has none.
+    label: what the legend names it by, which may be seen end on here; None has no entry.
     """
     from matplotlib.path import Path
 
@@ -79,8 +79,8 @@ def draw_glyph(
             zorder=3.2,
         )  # fmt: skip
     if label is not None:
-        axis.plot([], [], marker=_all_of(glyph), markersize=9.0, color=ink(), markeredgewidth=0.7,
-                  markerfacecolor="none", linestyle="none", label=label)  # fmt: skip
+        axis.plot([], [], marker=_all_of(label), markersize=9.0, color=ink(), markeredgewidth=0.7,
+                  markerfacecolor="none", linestyle="none", label=label.words)  # fmt: skip
 
 
 def _all_of(glyph: Glyph) -> Any:

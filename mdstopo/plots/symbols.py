@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import Table, TimeFormula
-from mdstopo.case.model import GROUND, Case, Load, LoadCase
+from mdstopo.case.model import GROUND, Case, Load, LoadCase, Prescribed, PrescribedRotation
+from mdstopo.case.prescribed import size_of
 from mdstopo.plots.scenery import Floats
 from mdstopo.scene.point_positions import points_at
 
@@ -62,11 +63,35 @@ def _ties(case: Case) -> Iterator[Symbol]:
 def _motions(case: Case, chosen: LoadCase) -> Iterator[Symbol]:
     middle = np.zeros(case.dimension)
     for motion in chosen.motions:
+        body = case.body(motion.body)
         for k, name in enumerate("xyz"[: case.dimension]):
-            if getattr(motion, name) is not None:
-                yield Symbol("motion", motion.body, middle, way=np.eye(case.dimension)[k])
-        if motion.angle is not None or motion.rotation is not None:
-            yield Symbol("turning", motion.body, middle)
+            own = getattr(motion, name)
+            if own is not None:
+                kind = "held" if _is_held(own, float(body.velocity[k])) else "motion"
+                yield Symbol(kind, motion.body, middle, way=np.eye(case.dimension)[k])
+        if motion.angle is not None:
+            yield Symbol("unturned" if _is_held(motion.angle, _rate(body)) else "turning", motion.body, middle)
+        if motion.rotation is not None:
+            yield Symbol("unturned" if _stands(motion.rotation) else "turning", motion.body, middle)
+
+
+def _rate(body: Any) -> float:
+    """The angular velocity of a body in the plane at the start, rad/s."""
+    return float(body.angular_velocity)
+
+
+def _is_held(own: Prescribed, rate: float) -> bool:
+    """Whether what is prescribed of a coordinate is that it stays. rate: of the coordinate at the start, as stated."""
+    if own.kind == "position" and isinstance(own.signal, Table):
+        return float(np.ptp(own.signal.values)) == 0.0
+    return size_of(own.signal) == 0.0 and (own.kind != "acceleration" or rate == 0.0)
+
+
+def _stands(rotation: PrescribedRotation) -> bool:
+    """Whether what is prescribed of a rotation is that there is none; accelerations may turn what turns already."""
+    return all(size_of(signal) == 0.0 for signal in rotation.signals) and not any(
+        angle.kind == "acceleration" for angle in rotation.angles
+    )
 
 
 def _loads(case: Case, chosen: LoadCase, time: float | None) -> Iterator[Symbol]:

@@ -25,7 +25,7 @@ const makeGlyphs = (g, glyphs) => {
     }
     const length = way ? Math.hypot(...way) : 1, angle = way && length > 0 ? Math.atan2(way[1], way[0]) : 0;
     const scale = kind === "load" ? Math.max(0.45, Math.abs(size)) : kind === "motion" || kind === "turning" ? 0.8 : 1;
-    if (length < END_ON && (kind === "load" || kind === "motion")) { g.fillStyle = INK; g.beginPath(); g.arc(at[0], at[1], 3, 0, 2 * Math.PI); g.fill(); return; }
+    if (length < END_ON && (kind === "load" || kind === "motion" || kind === "held")) { g.fillStyle = INK; g.beginPath(); g.arc(at[0], at[1], 3, 0, 2 * Math.PI); g.fill(); return; }
     draw(kind, at, angle, scale, size < 0);
   };
   return { draw, symbol };

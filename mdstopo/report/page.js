@@ -33,7 +33,7 @@
     for (const kind of kinds) entry(MARKS[kind] || "\u25cb", data.glyphs[kind].words, "#222222");
     at("legend").replaceChildren(...parts);
   };
-  const MARKS = { fixed: "\u25a0", prismatic: "\u25ad", cylindrical: "\u25ad", planar: "\u25b1", distance: "\u2022\u2014\u2022", bushing: "\u2307", load: "\u2192", moment: "\u21ba", motion: "\u21e8", turning: "\u21bb" };
+  const MARKS = { fixed: "\u25a0", prismatic: "\u25ad", cylindrical: "\u25ad", planar: "\u25b1", distance: "\u2022\u2014\u2022", bushing: "\u2307", load: "\u2192", moment: "\u21ba", motion: "\u21e8", turning: "\u21bb", held: "\u251c\u2524", unturned: "\u2612" };
 
   const draw = () => {
     const q = current(), m = motion();

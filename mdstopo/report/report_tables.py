@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import Case, ResponseRow
+from mdstopo.case.model import Case
 from mdstopo.case.over_time import REDUCTIONS
-from mdstopo.case.response_units import unit_of_value, words
+from mdstopo.case.response_units import constrained, unit_of_bound, unit_of_value
 from mdstopo.case.stages import stage_count
 from mdstopo.limiting.compare import kept_iterates
 from mdstopo.plots.member_forces import Chosen, forces_of
@@ -75,22 +75,10 @@ def constraint_rows(source: Source) -> list[dict[str, Any]]:
             end = 0.0
         margin = {"limit": -end, "at_least": end, "equals": -abs(end)}[row.sense]
         found.append(
-            {"what": constraint_words(source.case, row), "sense": row.sense, "bound": float(row.bound),
-             "unit": _unit(row), "start": start + row.bound, "best": end + row.bound, "margin": margin}
+            {"what": constrained(source.case, row), "sense": row.sense, "bound": float(row.bound),
+             "unit": unit_of_bound(row), "start": start + row.bound, "best": end + row.bound, "margin": margin}
         )  # fmt: skip
     return found
-
-
-def constraint_words(case: Case, row: Any) -> str:
-    """What a constraint bounds, in words."""
-    if not isinstance(row, ResponseRow):
-        return f"volume of {', '.join(row.groups)}"
-    where = f", {row.load_case}" if len(case.load_cases) > 1 else ""
-    return f"{row.over_time} {words(row.response)}{where}"
-
-
-def _unit(row: Any) -> str:
-    return unit_of_value(row) if isinstance(row, ResponseRow) else ""
 
 
 def peak_of(

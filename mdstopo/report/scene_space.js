@@ -134,7 +134,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     for (const symbol of symbolsAt(data, load(), time)) {
       const centre = place(all[symbol.body], symbol.at), s = seen(centre), end = symbol.end && seen(place(all[symbol.end[0]], symbol.end[1]));
       const seat = all[symbol.axes], way = symbol.way && [0, 1, 2].map((k) => dot(seat[k], symbol.way));
-      if (way && !["load", "motion"].includes(symbol.kind)) { // its axis, as long as it is in perspective
+      if (way && !["load", "motion", "held"].includes(symbol.kind)) { // its axis, as long as it is in perspective
         const [a, b] = [-0.07, 0.07].map((t) => seen(sum(centre, 1, way, t * radius)));
         things.push([s[2], () => line(a, b, "#222222", 1.5, 1)]);
       }

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.response_units import constrained, unit_of_bound
 from mdstopo.case.stages import stage_count
 from mdstopo.case.words import count_text
 from mdstopo.evaluators import make_engine
@@ -24,6 +25,7 @@ from mdstopo.session.advice import advise, without_slope
 from mdstopo.session.coarse_steps import coarse_steps
 from mdstopo.session.combining import Combining
 from mdstopo.session.compiling_apart import compile_apart
+from mdstopo.session.near_zero import near_zero
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.saved_states import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
@@ -185,6 +187,8 @@ class _Run:
         self.stated = case
         self.peaks: dict[str, tuple[tuple[float, float], ...]] = {}
         self.conclusion: Conclusion | None = None
+        #: the case's evaluator, until it is told that integrals are near to zero
+        self.watched: Engine | None = None
         #: what is to be closed in the end
         self.helpers = ExitStack()
 
@@ -216,6 +220,7 @@ class _Run:
         compiled = time.perf_counter()
         if path is not None:
             self.open(path, engine)
+        self.watched = engine
         opened = time.perf_counter()
         scalarisation = self.combine(started, begin, path)
         if scalarisation is not None or started is not engine:
@@ -392,6 +397,7 @@ class _Run:
 
         def keep(index: int, state: State) -> None:
             self.states[index] = state
+            self.tell_near_zero()
             self.on_iteration(Progress.of(state, index, len(self.states), most))
             if saver is not None:
                 saver.offer()
@@ -419,6 +425,12 @@ class _Run:
                 break
         else:
             self.has_ended = True
+
+    def tell_near_zero(self) -> None:
+        """Say once that an integral is so near to zero that it makes evaluations slow."""
+        if self.watched is not None and (sentence := near_zero(self.case, self.watched)):
+            self.notify(f"warning: {sentence}")
+            self.watched = None
 
     def is_through(self, task: StartTask) -> bool:
         """Whether a start has gone the part of its way that it was to go."""
@@ -499,9 +511,10 @@ class _Run:
             return status, reason
         row = self.case.constraints[i]
         word = {"limit": "above its limit", "at_least": "below its least", "equals": "away from its"}[row.sense]
+        unit = unit_of_bound(row)
         sentence = (
-            f"no design was found that keeps the constraints: constraints[{i}] is {abs(self.constraints[i]):.6g} "
-            f"{word} {row.bound:.6g}"
+            f"no design was found that keeps the constraints: constraints[{i}] ({constrained(self.case, row)}) is "
+            f"{f'{abs(self.constraints[i]):.6g} {unit}'.rstrip()} {word} {f'{row.bound:.6g} {unit}'.rstrip()}"
         )
         if row.bound == 0.0:  # the optimiser takes it as it is
             reason = reason.replace(" of its bound", "")

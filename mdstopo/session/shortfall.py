@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mdstopo.case.model import Case, ResponseRow
-from mdstopo.case.response_units import words
+from mdstopo.case.response_units import constrained
 from mdstopo.design_problem import SIGNS
 from mdstopo.optimizer.state import State
 from mdstopo.status import RunStatus
@@ -68,11 +68,4 @@ def holders(case: Case, state: State) -> list[str]:
     named = [index for index in order if shares[index] > SHARE * total][:NAMED]
     competing = int(np.count_nonzero((groups == 0) & (weights > SHARE * total)))
     peaks = f" ({competing} rows compete)" if competing > 1 else ""
-    return [f"the objective{peaks}", *(f"constraints[{i}] ({_what(case, i)})" for i in named)]
-
-
-def _what(case: Case, index: int) -> str:
-    row = case.constraints[index]
-    assert isinstance(row, ResponseRow)
-    where = f", {row.load_case}" if len(case.load_cases) > 1 else ""
-    return f"{row.over_time} {words(row.response)}{where}"
+    return [f"the objective{peaks}", *(f"constraints[{i}] ({constrained(case, case.constraints[i])})" for i in named)]

@@ -2,9 +2,15 @@
 
 import pytest
 
+from mdstopo import warm
+from mdstopo.case.reader import read_case
 from mdstopo.cli import output as outputs
+from mdstopo.cli.check import _say_what_stays_open
 from mdstopo.cli.output import Output
 from mdstopo.compiler import told
+
+BODY = "{format: 1, time: {end: 1}, bodies: {a: {mass: 1, inertia: 1, position: [0, 0]}}"
+GOAL = ", objectives: {G: {response: energy}}"
 
 
 @pytest.fixture
@@ -38,3 +44,14 @@ def test_what_was_announced_is_not_told_twice_and_quiet_is_quiet(
     Output(quiet=True)
     told.compiling("a")
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("due", "goals", "said"), [(True, GOAL, True), (False, GOAL, False), (True, "", False)])
+def test_check_says_before_it_compiles_that_it_will_not_know_the_cost(
+    due: bool, goals: str, said: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(warm, "compilation_due", lambda case: due)
+    _say_what_stays_open(Output(), read_case(f"{BODY}{goals}}}"))
+    told_before = capsys.readouterr().err
+    assert told_before.startswith("what one evaluation costs will be not known: ") is said
+    assert ("the first `gradient` or `run` compiles them" in told_before) is said

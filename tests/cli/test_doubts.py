@@ -1,6 +1,7 @@
 """What `check`, runs and `finalize` doubt: what nothing holds, odd scales, steps that are too long, worse designs."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,8 +15,12 @@ from mdstopo.cli.front_display import line
 from mdstopo.cli.group import run_group
 from mdstopo.cli.progress import Rate
 from mdstopo.finalize.finalize_design import worse_than_promised
+from mdstopo.front.run_front import Ask, _FrontRun
+from mdstopo.plan.solve_task import failed
 from mdstopo.session.coarse_steps import coarse_steps
+from mdstopo.starts.callbacks import ignore, never
 from mdstopo.status import Status
+from tests.front.support import CASE as FRONT
 
 ROOT = Path(__file__).resolve().parents[2]
 CRATE = """\
@@ -174,9 +179,28 @@ def test_no_time_is_left_only_when_nothing_is_to_come() -> None:
 
 
 @pytest.mark.parametrize(
-    ("left", "words"),
-    [(float("nan"), "time left not known"), (0.0, "less than 1 s left"), (70.0, "about 1 min 10 s left")],
+    ("left", "more", "words"),
+    [
+        (float("nan"), float("nan"), "time left not known"),
+        (0.0, 0.0, "less than 1 s left"),
+        (70.0, 0.5, "about 1 min 10 s left"),
+        (2.0, 60.0, "about 2 s left of this round, 1 min 0 s where more are needed"),
+        (2.0, float("nan"), "about 2 s left of this round"),
+    ],
 )
-def test_a_front_says_when_it_cannot_tell(left: float, words: str) -> None:
-    snapshot: Any = SimpleNamespace(directions=[0], best={}, running=(), done=3, evaluations=9, left=left)
+def test_a_front_says_when_it_cannot_tell(left: float, more: float, words: str) -> None:
+    snapshot: Any = SimpleNamespace(directions=[0], best={}, running=(), done=3, evaluations=9, left=left, more=more)
     assert line(snapshot).endswith(words)
+
+
+def test_what_a_front_may_still_need_is_told_apart_from_what_it_is_doing() -> None:
+    """At the end of the last round nothing of it is left, whatever such fronts usually need."""
+    told: list[Any] = []
+    run = _FrontRun(read_case(FRONT), Ask(np.eye(2)), told.append, never, ignore, "")
+    run.planner = SimpleNamespace(best={})  # type: ignore[assignment]
+    run.solved = {str(i): replace(failed(-1, "", np.zeros(1), 2, ""), seconds=4.0) for i in range(4)}
+    run.tell({0: 0})
+    run.tell({})
+    assert run.expected == pytest.approx(6.4)
+    assert [each.left for each in told] == [4.0, 0.0]
+    assert [each.more for each in told] == pytest.approx([1.4 * 4.0, 2.4 * 4.0])

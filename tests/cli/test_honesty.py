@@ -31,7 +31,8 @@ def test_a_run_that_finds_no_feasible_design_fails_and_names_the_constraint(caps
     Path("probe.yaml").write_text(single().replace("equals: 7.2}", "equals: 7.2}" + LIMIT))
     status = run_group(["run", "probe.yaml", "--json"])
     content = json.loads(capsys.readouterr().out)
-    assert "no design was found that keeps the constraints: constraints[1] is" in content["reason"]
+    what = "max displacement of torso relative to vehicle, rotation"
+    assert f"no design was found that keeps the constraints: constraints[1] ({what}) is" in content["reason"]
     # which of the two, and why, is a matter of rounding here
     assert (status, content["status"]) in ((1, "failed"), (1, "max_iterations"))
     assert content["constraints"][1] > 0.0
@@ -47,7 +48,11 @@ def test_the_violated_constraint_is_named_whatever_the_optimiser_ended_with(stat
     run.constraints = np.array([1e-12, 0.5e-6])
     word, reason = run.judge(0, status, "why it ended")
     assert word is (RunStatus.FAILED if status is RunStatus.CONVERGED else status)
-    assert "no design was found that keeps the constraints: constraints[1] is 5e-07 above its limit 1e-06" in reason
+    assert (
+        "no design was found that keeps the constraints: constraints[1] (max displacement of torso relative to vehicle"
+        in reason
+    )
+    assert ") is 5e-07 m above its limit 1e-06 m (why it ended)" in reason
     assert reason.endswith("(why it ended)")
     run.states = [SimpleNamespace(best_violation=0.0)]
     assert run.judge(0, status, "why it ended") == (status, "why it ended")

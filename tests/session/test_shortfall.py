@@ -102,6 +102,6 @@ def test_a_violation_of_a_limit_that_is_zero_is_no_share_of_it() -> None:
     """The mass rises at first whatever holds it."""
     case = read_case(CASE.replace("limit: 0.15", "limit: 0"), overrides={"optimizer.max_iterations": 60})
     found = optimize(case)
-    assert "constraints[1] is " in found.reason
-    assert "above its limit 0 " in found.reason
+    assert "constraints[1] (max displacement of mass) is " in found.reason
+    assert "above its limit 0 m " in found.reason
     assert "of its bound" not in found.reason

@@ -1,0 +1,49 @@
+"""Whether an integral over time is so near to zero that the tolerance, which is relative to it, makes steps short.
+
+An error is measured relative to the objective. Where a response hardly is anything beside the motion that it is seen
+from, rounding of that motion is more than the error that it may have, and steps are halved until they see it.
+"""
+
+from mdstopo.case.model import Case, Objective, ResponseRow
+from mdstopo.case.over_time import REDUCTIONS
+from mdstopo.case.response_units import constrained, unit_of_value, words
+from mdstopo.general.responses.extremes import VALUE
+
+#: steps that end where they do for the sake of integrals alone, from which on it is told, and how many times as many
+#: they are as the others
+MANY, TIMES = 500, 4
+
+
+def near_zero(case: Case, engine: object) -> str:
+    """Which integrals of the last evaluation are near to zero so that they cost many steps, and what helps; empty where
+    none is. engine: where it is no evaluator of one case, as of a sample, nothing is known of it."""
+    from mdstopo.engine import Evaluator
+    from mdstopo.general.driver.general_driver import GeneralDriver
+
+    if not isinstance(engine, Evaluator) or not engine.beyond:
+        return ""
+    for name in engine.scenes:
+        aims: list[Objective | ResponseRow] = [each for each in case.objectives if each.load_case == name]
+        aims += [each for each in case.constraints if isinstance(each, ResponseRow) and each.load_case == name]
+        integrals = [(j, aim) for j, aim in enumerate(aims) if REDUCTIONS[aim.over_time].is_integral]
+        if not integrals:
+            continue
+        driver = engine.driver(name)
+        assert isinstance(driver, GeneralDriver)
+        asked, others = len(driver.quadrature_breakpoints), driver.count - len(driver.quadrature_breakpoints)
+        if asked < MANY or asked < TIMES * others:
+            continue
+        found = [f"{_words(case, aim)} is {driver.rows[j, 0, VALUE]:.2g} {unit_of_value(aim)}" for j, aim in integrals]
+        return (
+            f"{' and '.join(found)}: an integral so near to zero takes {driver.count:,} steps where the motion takes "
+            f"{max(others, 1):,}, because solver.tolerance is relative to it; where less than some amount is as good "
+            "as nothing, add that to the response by an expression (formula: x + 1e-3), or loosen solver.tolerance"
+        )
+    return ""
+
+
+def _words(case: Case, aim: Objective | ResponseRow) -> str:
+    """An objective by its name and what it measures, a constraint by what it bounds."""
+    if isinstance(aim, ResponseRow):
+        return constrained(case, aim)
+    return f"objective {aim.name} ({aim.over_time} {words(aim.response)})"
