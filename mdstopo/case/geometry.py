@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mdstopo.case.arrays import Components, FloatArray
 from mdstopo.case.nodes import SCALAR, Node
-from mdstopo.case.parts import AnyBody, AnyContact, Load
+from mdstopo.case.parts import AnyContact, Load
 from mdstopo.case.reading import Fields, Reading
+from mdstopo.case.rigid_bodies import AnyBody
 from mdstopo.case.words import listed
 
 if TYPE_CHECKING:

@@ -56,9 +56,7 @@ from mdstopo.case.laws import (
 )
 from mdstopo.case.marks import Marks
 from mdstopo.case.parts import (
-    AnyBody,
     AnyContact,
-    Body,
     Bushing,
     Candidates,
     Contact,
@@ -70,10 +68,10 @@ from mdstopo.case.parts import (
     PointGrid,
     Prescribed,
     PrescribedRotation,
-    SpatialBody,
     Surface,
     SurfaceContact,
 )
+from mdstopo.case.rigid_bodies import AnyBody, Body, SpatialBody
 from mdstopo.case.uncertain import Uncertainty
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import GROUND

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.parts import AnyBody, Outline
 from mdstopo.case.reading import Fields, Reading
+from mdstopo.case.rigid_bodies import AnyBody, Outline
 from mdstopo.case.start_geometry import in_range
 
 CORNERS = 64

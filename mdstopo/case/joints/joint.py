@@ -6,9 +6,9 @@ from typing import Any, ClassVar, NamedTuple
 
 from mdstopo.case.arrays import Components, Pair
 from mdstopo.case.kinds import NUMBER, Name, Ref, Word
-from mdstopo.case.parts import AnyBody
 from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.records import ByName, ByShape, Key, Record, Vector
+from mdstopo.case.rigid_bodies import AnyBody
 from mdstopo.case.value import Value, frozen
 
 PAIR = Vector(2, NUMBER, ((3, "three are for a case with `dimension: 3`"),))
