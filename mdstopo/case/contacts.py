@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.coordinates import in_range
+from mdstopo.case.frames import Frames
 from mdstopo.case.model import AnyContact, Contact, PointGrid
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.start_geometry import Frames, in_range
 from mdstopo.case.words import inside, shown
 
 

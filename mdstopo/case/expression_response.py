@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mdstopo.case.aims import Response
 from mdstopo.case.formula_keys import FormulaNames, FormulaText
+from mdstopo.case.frames import Frames
 from mdstopo.case.kinds import NUMBER, Kind, Text
-from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.records import Key, Record
-from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.parser import TIME, parse
@@ -40,22 +40,18 @@ def expression_keys(response: Kind) -> Record:
     )
 
 
-def response_of(stated: Any, frames: Frames, reading: Reading) -> Response | None:
-    """The response that is stated, as a word or as a mapping from it to its keys; None where that is a mistake."""
-    if isinstance(stated, str):
-        return Response(stated, dimension=frames.geometry.number)
-    if not isinstance(stated, Fields) or len(stated.stated) != 1:
-        return None
-    (word,) = stated.stated
-    keys = stated[word]
-    if keys is BAD or not keys.good():
-        return None
-    made = frames.geometry.responses[word].made
-    return made(word, keys, frames, reading) if made is not None else Response(word, dimension=frames.geometry.number)
+def make_expression(
+    word: str,
+    keys: Fields,
+    response_of: Callable[[Any, Frames, Reading], Response | None],
+    frames: Frames,
+    reading: Reading,
+) -> Response | None:
+    """The response; None where there is a mistake, which is noted.
 
-
-def make_expression(word: str, keys: Fields, frames: Frames, reading: Reading) -> Response | None:
-    """The response; None where there is a mistake, which is noted."""
+    word, keys: of the response. response_of: makes each of the others from what is stated of it.
+    frames, reading: as the maker of any response gets them.
+    """
     made = {name: response_of(stated, frames, reading) for name, stated in keys["of"].items()}
     parameters: Mapping[str, float] = keys["parameters"] or {}
     path = inside(keys.path, "formula")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from mdstopo.case.fitting import Estimate, Fit, FitNumber, Series
+from mdstopo.case.frames import Frames
 from mdstopo.case.goals import build_response, load_case_of
 from mdstopo.case.key_paths import SECTIONS, led_to, number_at, why_fixed
 from mdstopo.case.nodes import Node
 from mdstopo.case.overrides import WrongPathError, steps_of
 from mdstopo.case.reading import BAD, Fields, Reading, found, is_good
-from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside, number_text
 
 

@@ -1,26 +1,18 @@
-"""What is different in the plane and in space for the reader of cases: one record for each, chosen once."""
+"""What is different in the plane and in space for the reader of cases: one record for each."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mdstopo.case.arrays import Components, FloatArray
-from mdstopo.case.nodes import SCALAR, Node
 from mdstopo.case.parts import AnyContact, Load
 from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.rigid_bodies import AnyBody
-from mdstopo.case.words import listed
 
 if TYPE_CHECKING:
     from mdstopo.case.joints.joint import Joint
     from mdstopo.case.records import Record
-    from mdstopo.case.responses import ResponseKind
-
-_MODULES = {2: "mdstopo.case.plane:PLANE", 3: "mdstopo.case.space:SPACE"}
-#: what may stand above `dimension`: nothing of it depends on the dimension
-_BEFORE = ("format", "dimension", "title", "extends", "define", "time", "design", "combine", "optimizer")
 
 
 class Geometry(NamedTuple):
@@ -34,7 +26,7 @@ class Geometry(NamedTuple):
     grid_count, grid_points (kind, keys), check_grid (kind, keys, reading): of point grids. build_load (keys, body, its
     point in body coordinates or BAD, reading): the load, None where it cannot be made. build_contact (fields that all
     contacts have, keys of what is touched, `Frames`, reading): the contact, None where it cannot be made.
-    joints, responses: by their words. default_at (first, second body): where a fixed joint is that does not say it.
+    joints: by their words. default_at (first, second body): where a fixed joint is that does not say it.
     """
 
     number: int
@@ -51,26 +43,4 @@ class Geometry(NamedTuple):
     build_load: Callable[[Fields, AnyBody, Components, Reading], Load | None]
     build_contact: Callable[[dict[str, Any], Fields, Any, Reading], AnyContact | None]
     joints: Mapping[str, type[Joint]]
-    responses: Mapping[str, ResponseKind]
     default_at: Callable[[AnyBody, AnyBody], Components]
-
-
-def geometry_of(dimension: int) -> Geometry:
-    """What a case reader has to know of a plane (2) or of space (3)."""
-    geometry: Geometry = resolve_name(_MODULES[dimension])
-    return geometry
-
-
-def geometry_in(root: Node, reading: Reading) -> Geometry:
-    """The dimension that a case states; the plane where it states none or a mistake. Notes where it is stated too
-    late."""
-    entry = root.entries.get("dimension")
-    if entry is None:
-        return geometry_of(2)
-    key, value = entry
-    names = list(root.entries)
-    late = [name for name in names[: names.index("dimension")] if name not in _BEFORE]
-    if late and not value.origin:
-        reading.mistake("dimension", f"stands below {listed(late)}; it stands above all that depends on it", key)
-    number = value.scalar() if value.kind == SCALAR else None
-    return geometry_of(3 if not isinstance(number, bool) and number == 3 else 2)

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.coordinates import in_range
+from mdstopo.case.frames import Frames
 from mdstopo.case.joints import Joint
 from mdstopo.case.joints.joint import Stated
 from mdstopo.case.model import Bushing, Components
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.start_geometry import Frames, in_range
 from mdstopo.case.words import inside, listed, shown
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from mdstopo.case.arrays import Signal, Table, TimeFormula, VectorSignal
+from mdstopo.case.frames import Frames
 from mdstopo.case.model import GROUND, AnyBody, Components, Load, LoadCase, Motion
 from mdstopo.case.motions import Start
 from mdstopo.case.prescribed import size_of
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside, number_text
 
 DEFAULT = "default"

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.coordinates import in_range
 from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.rigid_bodies import AnyBody, Outline
-from mdstopo.case.start_geometry import in_range
 
 CORNERS = 64
 """Of a polygon that stands for a circle."""

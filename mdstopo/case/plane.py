@@ -10,6 +10,7 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.contacts import edge_contact
+from mdstopo.case.coordinates import in_range
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.loading import scaled
@@ -18,9 +19,7 @@ from mdstopo.case.outlines import PLANAR, build_outlines
 from mdstopo.case.point_grids import grid_count, grid_points
 from mdstopo.case.prescribed import size_of
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.responses import RESPONSES
 from mdstopo.case.schema_case import FORMAT
-from mdstopo.case.start_geometry import in_range
 from mdstopo.case.words import inside, number_text
 
 
@@ -108,6 +107,5 @@ PLANE = Geometry(
     build_load=_build_load,
     build_contact=edge_contact,
     joints=JOINTS,
-    responses=RESPONSES,
     default_at=_default_at,
 )

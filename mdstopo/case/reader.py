@@ -16,11 +16,13 @@ from mdstopo.case.candidates import with_start_set
 from mdstopo.case.contacts import build_contacts
 from mdstopo.case.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.design_variables import build_shared, build_variables
+from mdstopo.case.dimensions import geometry_in
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.extending import KEY, CannotExtendError, extended, text_of_tree
 from mdstopo.case.file_text import FileTextError, text_in
 from mdstopo.case.fitting import Fit
-from mdstopo.case.geometry import Geometry, geometry_in
+from mdstopo.case.frames import Frames
+from mdstopo.case.geometry import Geometry
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.groups import build_groups
 from mdstopo.case.links import build_bushings, build_joints, declare_joints
@@ -33,7 +35,7 @@ from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reading import BAD, Fields, Reading, found
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
 from mdstopo.case.shipped import case_file, names
-from mdstopo.case.start_geometry import Frames, build_points
+from mdstopo.case.start_geometry import build_points
 from mdstopo.case.words import inside
 
 _SECTIONS = {

@@ -12,6 +12,7 @@ from typing import Any
 from mdstopo.case.aims import Response
 from mdstopo.case.distributions import Brought
 from mdstopo.case.expression_response import expression_keys, make_expression
+from mdstopo.case.frames import Frames
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import Ref, explained
 from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
@@ -20,7 +21,6 @@ from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import ByShape, Key, Record
 from mdstopo.case.schema_frame import FRAME
 from mdstopo.case.schema_scene import BODY, GROUP, IN_SPACE
-from mdstopo.case.start_geometry import Frames
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, shown
 
@@ -203,11 +203,15 @@ def response_kinds(
     )  # fmt: skip
 
 
+def _of_others(word: str, keys: Fields, frames: Frames, reading: Reading) -> Response | None:
+    return make_expression(word, keys, response_of, frames, reading)
+
+
 def of_expressions(response: ByShape) -> ResponseKind:
     """The record of the response that is an expression of others."""
     return ResponseKind(
         word="expression", doc="an expression of other responses", unit="", kernels="", keys=expression_keys(response),
-        made=make_expression,
+        made=_of_others,
     )  # fmt: skip
 
 
@@ -267,15 +271,35 @@ RESPONSES: dict[str, ResponseKind] = {
 RESPONSES["expression"] = of_expressions(response_kinds(dict(RESPONSES), IN_SPACE_ALONE, OF_OTHERS))
 
 
-def kind_of(response: Response) -> ResponseKind:
-    """The record of a response; KeyError where there is none."""
-    if response.dimension == 3:
+def responses_in(dimension: int) -> Mapping[str, ResponseKind]:
+    """The responses of a plane (2) or of space (3) by their words."""
+    if dimension == 3:
         from mdstopo.case.spatial_responses import SPATIAL_RESPONSES  # most cases are planar
 
-        return SPATIAL_RESPONSES[response.kind]
-    if response.kind not in RESPONSES:  # a process that has not read the case
+        return SPATIAL_RESPONSES
+    return RESPONSES
+
+
+def kind_of(response: Response) -> ResponseKind:
+    """The record of a response; KeyError where there is none."""
+    known = responses_in(response.dimension)
+    if response.dimension == 2 and response.kind not in known:  # a process that has not read the case
         OF_OTHERS.find(response.kind)
-    return RESPONSES[response.kind]
+    return known[response.kind]
+
+
+def response_of(stated: Any, frames: Frames, reading: Reading) -> Response | None:
+    """The response that is stated, as a word or as a mapping from it to its keys; None where that is a mistake."""
+    if isinstance(stated, str):
+        return Response(stated, dimension=frames.geometry.number)
+    if not isinstance(stated, Fields) or len(stated.stated) != 1:
+        return None
+    (word,) = stated.stated
+    keys = stated[word]
+    if keys is BAD or not keys.good():
+        return None
+    made = responses_in(frames.geometry.number)[word].made
+    return made(word, keys, frames, reading) if made is not None else Response(word, dimension=frames.geometry.number)
 
 
 def unit_stated(node: Node) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Triple, VectorSignal
+from mdstopo.case.coordinates import in_range
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
 from mdstopo.case.loading import scaled
@@ -20,8 +21,6 @@ from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
 from mdstopo.case.signals import UnaddedSignalsError, combined
 from mdstopo.case.spatial_outlines import SPATIAL
 from mdstopo.case.spatial_point_grids import check_grid, grid_count, grid_points
-from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
-from mdstopo.case.start_geometry import in_range
 from mdstopo.case.start_rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.surfaces import surface_contact
 from mdstopo.case.words import inside, listed, number_text
@@ -200,6 +199,5 @@ SPACE = Geometry(
     build_load=_build_load,
     build_contact=surface_contact,
     joints=SPATIAL_JOINTS,
-    responses=SPATIAL_RESPONSES,
     default_at=_default_at,
 )

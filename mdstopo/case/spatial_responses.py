@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mdstopo.case.aims import Response
+from mdstopo.case.frames import Frames
 from mdstopo.case.joints.spatial_keys import DIRECTION, TRIPLE
 from mdstopo.case.kinds import explained
 from mdstopo.case.reading import BAD, Fields, Reading
@@ -20,7 +21,6 @@ from mdstopo.case.responses import (
     with_since,
 )
 from mdstopo.case.schema_frame import FRAME
-from mdstopo.case.start_geometry import Frames
 from mdstopo.case.start_rotations import unit
 from mdstopo.case.words import inside
 

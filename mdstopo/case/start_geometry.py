@@ -1,4 +1,4 @@
-"""Points at the start: global coordinates become body coordinates."""
+"""Point grids at the start: their points in the coordinates of their bodies and in global ones."""
 
 from __future__ import annotations
 
@@ -6,65 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.arrays import FloatArray
-from mdstopo.case.geometry import Geometry, geometry_of
+from mdstopo.case.coordinates import in_range
+from mdstopo.case.frames import Frames
 from mdstopo.case.memory import BYTES_PER_POINT, total_memory
-from mdstopo.case.model import GROUND, AnyBody, Case, Components, PointGrid
+from mdstopo.case.model import PointGrid
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import count_text, inside
-
-LARGEST = 1e150
-"""Lengths and coordinates above it overflow when they are squared."""
-
-
-@frozen
-class Frames(Value):
-    """Positions and rotations of the bodies at the start. bodies: those that could be read, ground included."""
-
-    bodies: dict[str, AnyBody]
-    geometry: Geometry
-
-    def to_local(self, body: str, world: FloatArray) -> FloatArray:
-        """Body coordinates (n, dimension) of global points (n, dimension)."""
-        return world if body == GROUND else self.geometry.to_local(self.bodies[body], world)
-
-    def to_world(self, body: str, local: FloatArray) -> FloatArray:
-        """Global coordinates (n, dimension) of points (n, dimension) of a body."""
-        return local if body == GROUND else self.geometry.to_world(self.bodies[body], local)
-
-    def both(self, body: str, points: FloatArray, frame: str) -> tuple[FloatArray, FloatArray]:
-        """Points in the coordinates of their body and in global ones, from points stated in `frame`: global or body."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            if frame == "body":
-                return points, self.to_world(body, points)
-            return self.to_local(body, points), points
-
-    def point(self, body: str, point: Components, frame: str = "global") -> tuple[Components, Components]:
-        """A point at the start, in the coordinates of its body and in global ones."""
-        local, world = self.both(body, np.array([point], dtype=np.float64), frame)
-        return tuple(local[0].tolist()), tuple(world[0].tolist())
-
-    def local_point(self, body: str, at: Any, frame: str, path: str, reading: Reading) -> Any:
-        """Body coordinates of one point (None: the centre of mass), or BAD where they are too large."""
-        if at is None:
-            return (0.0,) * self.geometry.number
-        local, world = self.point(body, at, frame)
-        return local if in_range(np.array([local, world]), path, reading) else BAD
-
-
-def frames_of(case: Case) -> Frames:
-    """Where the bodies of a case stand at the start."""
-    geometry = geometry_of(case.dimension)
-    return Frames({GROUND: geometry.ground, **{body.name: body for body in case.bodies}}, geometry)
-
-
-def in_range(values: FloatArray, path: str, reading: Reading) -> bool:
-    """Whether all coordinates can be computed with; notes the mistake where not."""
-    if values.size and not (np.abs(values) < LARGEST).all():
-        reading.mistake(path, f"a coordinate is not below {LARGEST:g} m: too large to compute with")
-        return False
-    return True
 
 
 def build_points(sections: Any, frames: Frames, reading: Reading) -> dict[str, PointGrid]:

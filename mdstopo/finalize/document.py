@@ -16,6 +16,8 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.definitions import SECTION, with_numbers
+from mdstopo.case.dimensions import frames_of
+from mdstopo.case.frames import Frames
 from mdstopo.case.mesh_files import is_mesh
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
@@ -24,7 +26,6 @@ from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reader import measured
 from mdstopo.case.reading import Reading
-from mdstopo.case.start_geometry import Frames, frames_of
 from mdstopo.case.words import inside
 from mdstopo.finalize.apart import free_name
 from mdstopo.finalize.names import following_law, kept_expressions
