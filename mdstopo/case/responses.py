@@ -10,17 +10,15 @@ from dataclasses import replace
 from typing import Any
 
 from mdstopo.case.aims import Response
+from mdstopo.case.common_keys import BODY, FRAME, GROUP, IN_SPACE, PAIR
 from mdstopo.case.distributions import Brought
 from mdstopo.case.expression_response import expression_keys, make_expression
 from mdstopo.case.frames import Frames
-from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import Ref, explained
 from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import ByShape, Key, Record
-from mdstopo.case.schema_frame import FRAME
-from mdstopo.case.schema_scene import BODY, GROUP, IN_SPACE
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, shown
 

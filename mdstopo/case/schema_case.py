@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from mdstopo.case.common_keys import GROUP, PAIR
 from mdstopo.case.definitions import DEFINED_NAME, Definitions
 from mdstopo.case.integrators import names as integrators
-from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import (
     NOT_NEGATIVE,
     NUMBER,
@@ -37,7 +37,6 @@ from mdstopo.case.schema_fit import fit_record
 from mdstopo.case.schema_scene import (
     BODY_KEYS,
     BUSHING,
-    GROUP,
     GROUP_KEYS,
     JOINT,
     LAW,

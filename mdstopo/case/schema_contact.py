@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.joints.joint import PAIR
+from mdstopo.case.common_keys import BODY, FRAME, PAIR
 from mdstopo.case.kinds import NOT_NEGATIVE, POSITIVE, Name, Ref
 from mdstopo.case.records import Key, Record
-from mdstopo.case.schema_frame import FRAME
-from mdstopo.case.schema_scene import BODY
 
 EDGE = Record(
     "an edge",

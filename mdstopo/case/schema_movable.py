@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mdstopo.case.joints.joint import PAIR
+from mdstopo.case.common_keys import PAIR
 from mdstopo.case.kinds import POSITIVE
 from mdstopo.case.records import Key, Record, Vector
 

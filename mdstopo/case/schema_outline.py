@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from mdstopo.case.joints.joint import PAIR
-from mdstopo.case.joints.spatial_keys import TRIPLE
+from mdstopo.case.common_keys import FRAME, PAIR, TRIPLE
 from mdstopo.case.kinds import POSITIVE, Kind
 from mdstopo.case.mesh_files import MeshFaces
 from mdstopo.case.number_rows import Rows
 from mdstopo.case.records import ByShape, Key, ListOf, Record, Vector
-from mdstopo.case.schema_frame import FRAME
 from mdstopo.case.svg_path import SvgPath
 
 _MIDDLE = "the centre of mass"

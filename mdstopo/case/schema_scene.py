@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 
+from mdstopo.case.common_keys import BODY, COUNT, FRAME, FRAMES, IN_SPACE, PAIR
 from mdstopo.case.distributions import Brought, BroughtError
 from mdstopo.case.joints import JOINTS
-from mdstopo.case.joints.joint import BODIES, PAIR, POINT
+from mdstopo.case.joints.joint import BODIES, POINT
 from mdstopo.case.joints.joint import record_of as record_of_joint
 from mdstopo.case.kinds import (
     NOT_NEGATIVE,
@@ -24,17 +25,10 @@ from mdstopo.case.laws import LAWS, enter_law
 from mdstopo.case.laws.law import record_of as record_of_law
 from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByShape, Key, ListOf, Record, Tagged, Vector
-from mdstopo.case.schema_frame import FRAME, FRAMES
 from mdstopo.case.schema_movable import MOVABLE
 from mdstopo.case.schema_outline import OUTLINE
 
-COUNT = Number(minimum=1, whole=True)
-BODY = Ref("body")
-GROUP = Ref("member group")
-
 MASS = Key("mass", POSITIVE, "mass", required=True, unit="kg")
-#: what is told of keys and words that only cases in space have
-IN_SPACE = "it is for a case with `dimension: 3`"
 BODY_KEYS = Record(
     "a body",
     (

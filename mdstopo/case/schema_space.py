@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from mdstopo.case.common_keys import BODY, COUNT, DIRECTION, FRAME, FRAMES, TRIPLE
 from mdstopo.case.joints.joint import record_of
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
-from mdstopo.case.joints.spatial_keys import DIRECTION, POINT, TRIPLE
+from mdstopo.case.joints.spatial_keys import POINT
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind
 from mdstopo.case.mesh_files import MeshFile
 from mdstopo.case.number_rows import Rows, Signals
@@ -15,22 +16,9 @@ from mdstopo.case.responses import response_kinds
 from mdstopo.case.schema_case import CONSTRAINT, FORMAT, LOAD_CASE_KEY, OBJECTIVE
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_fit import fit_record
-from mdstopo.case.schema_frame import FRAME, FRAMES
 from mdstopo.case.schema_movable import along_line, movable
 from mdstopo.case.schema_outline import OUTLINE_IN_SPACE
-from mdstopo.case.schema_scene import (
-    BODY,
-    BUSHING,
-    COORDINATE,
-    COUNT,
-    GROUP_KEYS,
-    LOAD,
-    LOAD_CASE,
-    LOADS,
-    MASS,
-    MOTIONS,
-    POINTS,
-)
+from mdstopo.case.schema_scene import BUSHING, COORDINATE, GROUP_KEYS, LOAD, LOAD_CASE, LOADS, MASS, MOTIONS, POINTS
 from mdstopo.case.schema_surface import SURFACE
 from mdstopo.case.spatial_responses import IN_PLANE_ALONE, SPATIAL_RESPONSES
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.joints.spatial_keys import DIRECTION, TRIPLE
+from mdstopo.case.common_keys import BODY, DIRECTION, FRAME, TRIPLE
 from mdstopo.case.kinds import POSITIVE, Flag
 from mdstopo.case.records import Key, Record, Vector
-from mdstopo.case.schema_frame import FRAME
-from mdstopo.case.schema_scene import BODY
 
 _CENTER = Key("center", TRIPLE, "centre", required=True, unit="m")
 _RADIUS = Key("radius", POSITIVE, "radius", required=True, unit="m")

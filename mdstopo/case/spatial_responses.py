@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mdstopo.case.aims import Response
+from mdstopo.case.common_keys import DIRECTION, FRAME, TRIPLE
 from mdstopo.case.frames import Frames
-from mdstopo.case.joints.spatial_keys import DIRECTION, TRIPLE
 from mdstopo.case.kinds import explained
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
@@ -20,7 +20,6 @@ from mdstopo.case.responses import (
     sees_itself,
     with_since,
 )
-from mdstopo.case.schema_frame import FRAME
 from mdstopo.case.start_rotations import unit
 from mdstopo.case.words import inside
 

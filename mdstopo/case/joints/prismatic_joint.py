@@ -6,7 +6,8 @@ import math
 from typing import Any, ClassVar
 
 from mdstopo.case.arrays import Pair
-from mdstopo.case.joints.joint import PAIR, POINT, Joint, Stated
+from mdstopo.case.common_keys import PAIR
+from mdstopo.case.joints.joint import POINT, Joint, Stated
 from mdstopo.case.reading import Reading
 from mdstopo.case.records import Direction, Key
 from mdstopo.case.value import frozen
