@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import Field
 from typing import Any
 
-import numpy as np
-
-from mdstopo.case.arrays import FloatArray
 from mdstopo.case.candidates import unlike
 from mdstopo.case.kinds import Number
 from mdstopo.case.laws.law import with_role
@@ -209,9 +206,3 @@ def _within(fields: Fields, initial: float, field: Field[Any], reading: Reading)
         reading.mistake(inside(fields.path, "initial"), message)
         good = False
     return good
-
-
-def prices(variables: tuple[Variable, ...], groups: tuple[str, ...]) -> FloatArray:
-    """(P,) what the values of variables add to a volume row over some groups; none where there are no variables."""
-    pieces = [np.full(v.count, v.cost if {*v.groups, *v.reached} & set(groups) else 0.0) for v in variables]
-    return np.concatenate(pieces) if pieces else np.zeros(0)

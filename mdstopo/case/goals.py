@@ -11,16 +11,15 @@ import numpy as np
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.candidates import coefficients_of
 from mdstopo.case.catalogue import with_catalogue
-from mdstopo.case.design_variables import prices
 from mdstopo.case.frames import Frames
-from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.over_time import DEFAULT_REDUCTION
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.responses import response_of
 from mdstopo.case.schema_case import SENSES
 from mdstopo.case.stages import check_powers, lowest, powers_of
-from mdstopo.case.volume import check_feasible
+from mdstopo.case.volume import check_feasible, prices
+from mdstopo.case.windows import DEFAULT
 from mdstopo.case.words import inside, listed, number_text, shown
 from mdstopo.settings.scalarisations import SCALARISATIONS
 

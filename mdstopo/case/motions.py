@@ -6,7 +6,7 @@ taken from it. The scene is drawn once, so all load cases must start a body at o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.model import GROUND, Motion
@@ -14,10 +14,8 @@ from mdstopo.case.prescribed import AGREE, agree, position_at_start, prescribed,
 from mdstopo.case.prescribed_rotation import prescribed_rotation, turning_rate_at_start
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.value import Value, frozen
+from mdstopo.case.windows import Window
 from mdstopo.case.words import inside, number_text, shown
-
-if TYPE_CHECKING:
-    from mdstopo.case.loading import Window
 
 
 @frozen

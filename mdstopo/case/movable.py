@@ -15,13 +15,13 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray, FrozenDict
 from mdstopo.case.candidates import coefficients_of, lengths_between
 from mdstopo.case.coordinates import in_range
-from mdstopo.case.design_variables import prices
 from mdstopo.case.dimensions import frames_of
 from mdstopo.case.frames import Frames
 from mdstopo.case.model import GROUND, AnyBody, Case, MemberGroup, MovablePoints, PointGrid, Variable, VolumeRow
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.spatial_point_grids import check_grid
 from mdstopo.case.start_rotations import frame_with, unit
+from mdstopo.case.volume import prices
 from mdstopo.case.words import inside, number_text
 
 #: how far from its region a point may be at first, relative to the size of the coordinates

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +10,8 @@ from mdstopo.case.arrays import Signal, Table, TimeFormula
 from mdstopo.case.model import Prescribed
 from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.spline import value_and_slope
+from mdstopo.case.windows import Window
 from mdstopo.case.words import number_text
-
-if TYPE_CHECKING:
-    from mdstopo.case.loading import Window
 
 AGREE = 1e-8
 """How far, relative to the values at hand, a stated start may lie from a prescribed one."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
@@ -11,10 +9,8 @@ from mdstopo.case.model import Prescribed, PrescribedRotation
 from mdstopo.case.prescribed import AGREE, KINDS, agree, position_at_start, prescribed, rate_at_start, size_of, value_at
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.start_rotations import unit
+from mdstopo.case.windows import Window
 from mdstopo.case.words import inside, listed, number_text
-
-if TYPE_CHECKING:
-    from mdstopo.case.loading import Window
 
 ANGLES = ("roll", "pitch", "yaw")
 

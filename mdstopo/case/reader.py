@@ -26,7 +26,7 @@ from mdstopo.case.geometry import Geometry
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.groups import build_groups
 from mdstopo.case.links import build_bushings, build_joints, declare_joints
-from mdstopo.case.loading import build_load_cases, windows
+from mdstopo.case.loading import build_load_cases
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.movable import build_movable
@@ -36,6 +36,7 @@ from mdstopo.case.reading import BAD, Fields, Reading, found
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
 from mdstopo.case.shipped import case_file, names
 from mdstopo.case.start_geometry import build_points
+from mdstopo.case.windows import windows
 from mdstopo.case.words import inside
 
 _SECTIONS = {

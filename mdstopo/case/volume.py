@@ -1,9 +1,12 @@
-"""Whether volume rows can be met within the bounds (Eq. 14)."""
+"""Volume rows (Eq. 14): what variables add to them, and whether they can be met within the bounds."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray
 from mdstopo.case.candidates import most_cost
 from mdstopo.case.model import MemberGroup, Variable, VolumeRow
 from mdstopo.case.reading import Reading
@@ -11,6 +14,12 @@ from mdstopo.case.words import listed, number_text
 
 ROUNDING = 1e-12
 """Sums are compared up to this share of them: 1020 x 0.001 may be spent exactly."""
+
+
+def prices(variables: tuple[Variable, ...], groups: tuple[str, ...]) -> FloatArray:
+    """(P,) what the values of variables add to a volume row over some groups; none where there are no variables."""
+    pieces = [np.full(v.count, v.cost if {*v.groups, *v.reached} & set(groups) else 0.0) for v in variables]
+    return np.concatenate(pieces) if pieces else np.zeros(0)
 
 
 def check_feasible(

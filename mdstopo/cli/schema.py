@@ -21,7 +21,7 @@ def command(section: str | None, space: bool, out: Path | None) -> int:
     listed in words; `case` lists the sections.
     """
     from mdstopo.case.distributions import BroughtError
-    from mdstopo.case.schema_case import ask_distributions, json_schema
+    from mdstopo.case.json_schema import ask_distributions, json_schema
 
     try:
         ask_distributions()

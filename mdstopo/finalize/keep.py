@@ -9,10 +9,9 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
 from mdstopo.case.design_space import slots_of
-from mdstopo.case.design_variables import prices
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case, Variable, VolumeRow
-from mdstopo.case.volume import ROUNDING
+from mdstopo.case.volume import ROUNDING, prices
 from mdstopo.case.words import count_text, number_text, shown
 from mdstopo.finalize.apart import part, with_own
 

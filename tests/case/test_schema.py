@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 from mdstopo.case.errors import CaseError
+from mdstopo.case.json_schema import json_schema
 from mdstopo.case.nodes import MAPPING, SEQUENCE, Node, parse
 from mdstopo.case.reader import load_case, read_case
-from mdstopo.case.schema_case import json_schema
 from tests.tiers import examples
 
 from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL
