@@ -16,7 +16,7 @@ from pathlib import Path
 
 from mdstopo import load_case
 from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.case.shipped import names
+from mdstopo.case.text.shipped import names
 from mdstopo.cli.new import templates
 from mdstopo.compiler.store import PROCESSORS
 

@@ -13,7 +13,7 @@ import yaml
 
 from mdstopo import __version__, load_case
 from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.case.shipped import names
+from mdstopo.case.text.shipped import names
 from mdstopo.cli.new import templates
 from mdstopo.compiler import store
 from mdstopo.compiler.entry import Entry, types_of

@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Any
 
 from mdstopo.case.model import Case, MemberGroup
-from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.words import inside, number_text, shown
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, number_text, shown
 
 #: sizes of a group's members, and their prices
 Sizes = tuple[tuple[float, ...], tuple[float, ...]]

@@ -10,8 +10,8 @@ import numpy as np
 from mdstopo.case.coordinates import in_range
 from mdstopo.case.frames import Frames
 from mdstopo.case.model import AnyContact, Contact, PointGrid
-from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.words import inside, shown
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, shown
 
 
 def build_contacts(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.reading import Reading
+from mdstopo.case.text.reading import Reading
 
 LARGEST = 1e150
 """Lengths and coordinates above it overflow when they are squared."""

@@ -11,11 +11,11 @@ from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
-from mdstopo.case.reading import BAD, Reading, found
-from mdstopo.case.scalars import to_float
+from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.text.reading import BAD, Reading, found
+from mdstopo.case.text.scalars import to_float
+from mdstopo.case.text.words import inside, shown
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import inside, shown
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.formula_values import finite_value
 from mdstopo.formula.parser import WORD, Formula, parse, reserved

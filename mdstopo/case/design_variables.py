@@ -9,9 +9,9 @@ from mdstopo.case.candidates import unlike
 from mdstopo.case.kinds import Number
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Follows, Law, MemberGroup, Variable
-from mdstopo.case.nodes import Node
-from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.words import inside, listed, number_text, shown
+from mdstopo.case.text.nodes import Node
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, listed, number_text, shown
 
 
 def varying(law: Law) -> tuple[str, ...]:

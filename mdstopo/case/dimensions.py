@@ -5,9 +5,9 @@ from __future__ import annotations
 from mdstopo.case.frames import Frames
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.model import GROUND, Case
-from mdstopo.case.nodes import SCALAR, Node
-from mdstopo.case.reading import Reading
-from mdstopo.case.words import listed
+from mdstopo.case.text.nodes import SCALAR, Node
+from mdstopo.case.text.reading import Reading
+from mdstopo.case.text.words import listed
 
 #: what may stand above `dimension`: nothing of it depends on the dimension
 _BEFORE = ("format", "dimension", "title", "extends", "define", "time", "design", "combine", "optimizer")

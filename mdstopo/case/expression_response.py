@@ -9,9 +9,9 @@ from mdstopo.case.aims import Response
 from mdstopo.case.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.frames import Frames
 from mdstopo.case.kinds import NUMBER, Kind, Text
-from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.records import Key, Record
-from mdstopo.case.words import inside
+from mdstopo.case.text.reading import Fields, Reading
+from mdstopo.case.text.words import inside
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.parser import TIME, parse
 

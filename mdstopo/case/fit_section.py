@@ -7,11 +7,11 @@ import math
 from mdstopo.case.fitting import Estimate, Fit, FitNumber, Series
 from mdstopo.case.frames import Frames
 from mdstopo.case.goals import build_response, load_case_of
-from mdstopo.case.key_paths import SECTIONS, led_to, number_at, why_fixed
-from mdstopo.case.nodes import Node
-from mdstopo.case.overrides import WrongPathError, steps_of
-from mdstopo.case.reading import BAD, Fields, Reading, found, is_good
-from mdstopo.case.words import inside, number_text
+from mdstopo.case.text.key_paths import SECTIONS, led_to, number_at, why_fixed
+from mdstopo.case.text.nodes import Node
+from mdstopo.case.text.overrides import WrongPathError, steps_of
+from mdstopo.case.text.reading import BAD, Fields, Reading, found, is_good
+from mdstopo.case.text.words import inside, number_text
 
 
 def build_fit(top: Fields, root: Node, frames: Frames, reading: Reading) -> Fit | None:

@@ -6,10 +6,10 @@ from collections.abc import Container
 from typing import Any
 
 from mdstopo.case.kinds import Kind, Schema
-from mdstopo.case.nodes import MAPPING, SCALAR, Node
-from mdstopo.case.reading import BAD, Reading, found
+from mdstopo.case.text.nodes import MAPPING, SCALAR, Node
+from mdstopo.case.text.reading import BAD, Reading, found
+from mdstopo.case.text.words import inside, shown
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import inside, shown
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.parser import TIME, WORD, parse, reserved
 

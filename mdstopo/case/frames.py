@@ -9,10 +9,10 @@ import numpy as np
 from mdstopo.case.arrays import Components, FloatArray
 from mdstopo.case.coordinates import in_range
 from mdstopo.case.geometry import Geometry
-from mdstopo.case.reading import BAD, Reading
 from mdstopo.case.rigid_bodies import AnyBody
+from mdstopo.case.text.reading import BAD, Reading
+from mdstopo.case.text.words import GROUND
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import GROUND
 
 
 @frozen

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mdstopo.case.arrays import Components, FloatArray
 from mdstopo.case.parts import AnyContact, Load
-from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.rigid_bodies import AnyBody
+from mdstopo.case.text.reading import Fields, Reading
 
 if TYPE_CHECKING:
     from mdstopo.case.joints.joint import Joint

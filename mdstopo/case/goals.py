@@ -14,13 +14,13 @@ from mdstopo.case.catalogue import with_catalogue
 from mdstopo.case.frames import Frames
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.over_time import DEFAULT_REDUCTION
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.responses import response_of
 from mdstopo.case.schema_case import SENSES
 from mdstopo.case.stages import check_powers, lowest, powers_of
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, listed, number_text, shown
 from mdstopo.case.volume import check_feasible, prices
 from mdstopo.case.windows import DEFAULT
-from mdstopo.case.words import inside, listed, number_text, shown
 from mdstopo.settings.scalarisations import SCALARISATIONS
 
 DESIGN_KEYS = ("initial", "lower", "upper", "power")

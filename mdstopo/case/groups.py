@@ -13,9 +13,9 @@ from mdstopo.case.frames import Frames
 from mdstopo.case.laws.law import numbers
 from mdstopo.case.memory import BYTES_PER_MEMBER, total_memory
 from mdstopo.case.model import GROUND, LAWS, Candidates, Law, MemberGroup, PointGrid
-from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import count_text, inside, number_text
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import count_text, inside, number_text
 
 CHUNK = 1 << 18
 MOST_CANDIDATES = 10**10

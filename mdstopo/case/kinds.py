@@ -11,12 +11,12 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
-from mdstopo.case.quantities import PATTERN, QuantityError, in_si, is_quantity, unit_at
-from mdstopo.case.reading import BAD, Bad, Reading, Reference, found
-from mdstopo.case.scalars import to_float
+from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
+from mdstopo.case.text.quantities import PATTERN, QuantityError, in_si, is_quantity, unit_at
+from mdstopo.case.text.reading import BAD, Bad, Reading, Reference, found
+from mdstopo.case.text.scalars import to_float
+from mdstopo.case.text.words import did_you_mean, listed, number_text, shown
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import did_you_mean, listed, number_text, shown
 
 Schema = dict[str, Any]
 

@@ -14,8 +14,8 @@ from mdstopo.case.frames import Frames
 from mdstopo.case.joints import Joint
 from mdstopo.case.joints.joint import Stated
 from mdstopo.case.model import Bushing, Components
-from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.words import inside, listed, shown
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, listed, shown
 
 
 def declare_joints(entries: Any, reading: Reading) -> None:

@@ -11,9 +11,9 @@ from mdstopo.case.frames import Frames
 from mdstopo.case.model import GROUND, AnyBody, Components, Load, LoadCase, Motion
 from mdstopo.case.motions import Start
 from mdstopo.case.prescribed import size_of
-from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, number_text
 from mdstopo.case.windows import DEFAULT, Window
-from mdstopo.case.words import inside, number_text
 
 
 def build_load_cases(

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, read_only
-from mdstopo.case.nodes import Node
 from mdstopo.case.number_rows import FileName
-from mdstopo.case.reading import BAD, Reading
-from mdstopo.case.words import shown
+from mdstopo.case.text.nodes import Node
+from mdstopo.case.text.reading import BAD, Reading
+from mdstopo.case.text.words import shown
 
 _HEAD, _FACET = 84, 50
 """Bytes of a binary STL file before its facets, and of each of these."""

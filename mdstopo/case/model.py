@@ -37,7 +37,6 @@ from mdstopo.case.arrays import (
     read_only,
 )
 from mdstopo.case.design_space import DesignSpace, slots_of
-from mdstopo.case.errors import Mistake
 from mdstopo.case.fitting import Fit
 from mdstopo.case.joints import JOINTS, DistanceJoint, FixedJoint, Joint, PrismaticJoint, RevoluteJoint
 from mdstopo.case.joints.spatial_joint import SpatialJoint
@@ -54,7 +53,6 @@ from mdstopo.case.laws import (
     SpringLaw,
     TableLaw,
 )
-from mdstopo.case.marks import Marks
 from mdstopo.case.parts import (
     AnyContact,
     Bushing,
@@ -72,9 +70,11 @@ from mdstopo.case.parts import (
     SurfaceContact,
 )
 from mdstopo.case.rigid_bodies import AnyBody, Body, SpatialBody
+from mdstopo.case.text.errors import Mistake
+from mdstopo.case.text.marks import Marks
+from mdstopo.case.text.words import GROUND
 from mdstopo.case.uncertain import Uncertainty
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import GROUND
 from mdstopo.shown import counted, html_of
 
 __all__ = [

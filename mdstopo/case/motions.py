@@ -12,10 +12,10 @@ from mdstopo.case.geometry import Geometry
 from mdstopo.case.model import GROUND, Motion
 from mdstopo.case.prescribed import AGREE, agree, position_at_start, prescribed, rate_at_start, size_of
 from mdstopo.case.prescribed_rotation import prescribed_rotation, turning_rate_at_start
-from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, number_text, shown
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.windows import Window
-from mdstopo.case.words import inside, number_text, shown
 
 
 @frozen

@@ -18,11 +18,11 @@ from mdstopo.case.coordinates import in_range
 from mdstopo.case.dimensions import frames_of
 from mdstopo.case.frames import Frames
 from mdstopo.case.model import GROUND, AnyBody, Case, MemberGroup, MovablePoints, PointGrid, Variable, VolumeRow
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.spatial_point_grids import check_grid
 from mdstopo.case.start_rotations import frame_with, unit
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, number_text
 from mdstopo.case.volume import prices
-from mdstopo.case.words import inside, number_text
 
 #: how far from its region a point may be at first, relative to the size of the coordinates
 OUTSIDE = 1e-9

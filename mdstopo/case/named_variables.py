@@ -13,14 +13,14 @@ from mdstopo.case.aims import Following, Follows, Variable
 from mdstopo.case.arrays import FloatArray, FrozenDict
 from mdstopo.case.definitions import MARK, SECTION, is_kept_as_text
 from mdstopo.case.following import Expressions, expressions_of
-from mdstopo.case.key_paths import stated_variables
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import MemberGroup
 from mdstopo.case.movable import is_of_use
-from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
-from mdstopo.case.reading import Fields, Reading
-from mdstopo.case.scalars import to_float
-from mdstopo.case.words import did_you_mean, inside, listed, number_text, shown
+from mdstopo.case.text.key_paths import stated_variables
+from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
+from mdstopo.case.text.reading import Fields, Reading
+from mdstopo.case.text.scalars import to_float
+from mdstopo.case.text.words import did_you_mean, inside, listed, number_text, shown
 
 #: what may follow from a name that varies
 ALLOWED = "numbers of laws, places of grids of points that members end at, masses, loads and velocities at the start"

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 
 from mdstopo.case.kinds import NUMBER, POSITIVE, Kind
 from mdstopo.case.number_rows import Rows
-from mdstopo.case.reading import Reading
 from mdstopo.case.records import Key, Record
+from mdstopo.case.text.reading import Reading
+from mdstopo.case.text.words import inside, number_text
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import inside, number_text
 
 #: by how much stated probabilities may miss the sum 1: thirds are written 0.333
 ROUNDED = 0.01

@@ -10,13 +10,13 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Table, read_only
 from mdstopo.case.kinds import Number, Schema, expressible, has_unit, with_unit
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
-from mdstopo.case.reading import BAD, Bad, Fields, Reading, found
 from mdstopo.case.records import Key, Record
-from mdstopo.case.scalars import resolve, to_float
+from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.text.reading import BAD, Bad, Fields, Reading, found
+from mdstopo.case.text.scalars import resolve, to_float
+from mdstopo.case.text.words import inside, number_text, shown
 from mdstopo.case.time_formula import formula_record, is_expression, is_formula, read_formulas
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import inside, number_text, shown
 
 MOST_TOLD = 10
 """Mistakes told of one set of rows; more would only repeat themselves."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.coordinates import in_range
-from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.rigid_bodies import AnyBody, Outline
+from mdstopo.case.text.reading import Fields, Reading
 
 CORNERS = 64
 """Of a polygon that stands for a circle."""

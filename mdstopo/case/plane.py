@@ -18,9 +18,9 @@ from mdstopo.case.model import GROUND, Body, Load, Pair
 from mdstopo.case.outlines import PLANAR, build_outlines
 from mdstopo.case.point_grids import grid_count, grid_points
 from mdstopo.case.prescribed import size_of
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.schema_case import FORMAT
-from mdstopo.case.words import inside, number_text
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, number_text
 
 
 def _to_local(body: Body, world: FloatArray) -> FloatArray:

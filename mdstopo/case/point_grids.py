@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Pair
-from mdstopo.case.reading import Fields
+from mdstopo.case.text.reading import Fields
 
 
 def grid_count(kind: str, grid: Fields | FloatArray) -> int:

@@ -8,10 +8,10 @@ import numpy as np
 
 from mdstopo.case.arrays import Signal, Table, TimeFormula
 from mdstopo.case.model import Prescribed
-from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.spline import value_and_slope
+from mdstopo.case.text.reading import Fields, Reading
+from mdstopo.case.text.words import number_text
 from mdstopo.case.windows import Window
-from mdstopo.case.words import number_text
 
 AGREE = 1e-8
 """How far, relative to the values at hand, a stated start may lie from a prescribed one."""

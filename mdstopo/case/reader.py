@@ -17,9 +17,6 @@ from mdstopo.case.contacts import build_contacts
 from mdstopo.case.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.dimensions import geometry_in
-from mdstopo.case.errors import CaseError, Mistake
-from mdstopo.case.extending import KEY, CannotExtendError, extended, text_of_tree
-from mdstopo.case.file_text import FileTextError, text_in
 from mdstopo.case.fitting import Fit
 from mdstopo.case.frames import Frames
 from mdstopo.case.geometry import Geometry
@@ -30,14 +27,17 @@ from mdstopo.case.loading import build_load_cases
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.movable import build_movable
-from mdstopo.case.nodes import MAPPING, Node, YamlSyntaxError, parse
-from mdstopo.case.overrides import apply_overrides
-from mdstopo.case.reading import BAD, Fields, Reading, found
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
-from mdstopo.case.shipped import case_file, names
 from mdstopo.case.start_geometry import build_points
+from mdstopo.case.text.errors import CaseError, Mistake
+from mdstopo.case.text.extending import KEY, CannotExtendError, extended, text_of_tree
+from mdstopo.case.text.file_text import FileTextError, text_in
+from mdstopo.case.text.nodes import MAPPING, Node, YamlSyntaxError, parse
+from mdstopo.case.text.overrides import apply_overrides
+from mdstopo.case.text.reading import BAD, Fields, Reading, found
+from mdstopo.case.text.shipped import case_file, names
+from mdstopo.case.text.words import inside
 from mdstopo.case.windows import windows
-from mdstopo.case.words import inside
 
 _SECTIONS = {
     "body": "bodies",

@@ -7,10 +7,10 @@ from typing import Any
 
 from mdstopo.case.distributions import Brought, BroughtError
 from mdstopo.case.kinds import Kind, Name, Schema, Word, check_name
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
-from mdstopo.case.reading import BAD, Fields, Reading, Reference, found
+from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.text.reading import BAD, Fields, Reading, Reference, found
+from mdstopo.case.text.words import inside, listed, nearest, shown
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import inside, listed, nearest, shown
 
 
 @frozen

@@ -15,12 +15,12 @@ from mdstopo.case.distributions import Brought
 from mdstopo.case.expression_response import expression_keys, make_expression
 from mdstopo.case.frames import Frames
 from mdstopo.case.kinds import Ref, explained
-from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import ByShape, Key, Record
+from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, shown
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import inside, shown
 
 Made = Callable[[str, Fields, Frames, Reading], Response | None]
 

@@ -25,11 +25,9 @@ from mdstopo.case.kinds import (
     Version,
     explained,
 )
-from mdstopo.case.nodes import SCALAR, Node
 from mdstopo.case.number_rows import FileName
 from mdstopo.case.over_time import DEFAULT_REDUCTION
 from mdstopo.case.over_time import names as reductions
-from mdstopo.case.reading import Reading
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.responses import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
 from mdstopo.case.schema_contact import CONTACT
@@ -48,8 +46,10 @@ from mdstopo.case.schema_scene import (
 from mdstopo.case.schema_uncertainty import UNCERTAINTY
 from mdstopo.case.sensitivities import AUTO_SENSITIVITY
 from mdstopo.case.sensitivities import names as sensitivities
+from mdstopo.case.text.nodes import SCALAR, Node
+from mdstopo.case.text.reading import Reading
+from mdstopo.case.text.words import listed
 from mdstopo.case.value import frozen
-from mdstopo.case.words import listed
 from mdstopo.settings.optimizer_options import OPTIONS
 from mdstopo.settings.optimizer_presets import DEFAULT_OPTIMIZER, PRESETS
 from mdstopo.settings.optimizers import names as optimizers

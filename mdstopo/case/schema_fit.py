@@ -7,11 +7,11 @@ from typing import Any
 from mdstopo.case.kinds import NUMBER, POSITIVE, Kind, Number, Schema, explained
 from mdstopo.case.losses import DEFAULT_LOSS
 from mdstopo.case.losses import names as losses
-from mdstopo.case.nodes import SCALAR, Node
 from mdstopo.case.number_rows import FileName
-from mdstopo.case.reading import BAD, Reading, found
 from mdstopo.case.records import ByShape, Key, Named, Record
 from mdstopo.case.schema_uncertainty import ByKey
+from mdstopo.case.text.nodes import SCALAR, Node
+from mdstopo.case.text.reading import BAD, Reading, found
 from mdstopo.case.value import Value, frozen
 
 

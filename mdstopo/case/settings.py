@@ -8,10 +8,10 @@ from typing import Any
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.integrators import AUTO, INTEGRATORS, having
 from mdstopo.case.model import OptimizerSettings, SolverSettings
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.sensitivities import chosen
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import count_text, inside, listed, number_text
 from mdstopo.case.windows import Window
-from mdstopo.case.words import count_text, inside, listed, number_text
 from mdstopo.settings.optimizer_options import OPTIONS
 from mdstopo.settings.optimizers import OPTIMIZERS
 

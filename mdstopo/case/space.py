@@ -16,14 +16,14 @@ from mdstopo.case.loading import scaled
 from mdstopo.case.model import GROUND, Load, SpatialBody
 from mdstopo.case.outlines import build_outlines
 from mdstopo.case.prescribed import size_of
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
 from mdstopo.case.signals import UnaddedSignalsError, combined
 from mdstopo.case.spatial_outlines import SPATIAL
 from mdstopo.case.spatial_point_grids import check_grid, grid_count, grid_points
 from mdstopo.case.start_rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.surfaces import surface_contact
-from mdstopo.case.words import inside, listed, number_text
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, listed, number_text
 
 UNIT = 1e-6
 """How far quaternions and matrices may be from norm 1; they are normalised."""

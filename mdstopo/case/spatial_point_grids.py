@@ -10,9 +10,9 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.point_grids import evenly, rectangle_sides
-from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.start_rotations import frame_with, parallel, unit
-from mdstopo.case.words import inside
+from mdstopo.case.text.reading import Fields, Reading
+from mdstopo.case.text.words import inside
 
 PERPENDICULAR = 1e-6
 """The largest scalar product of unit vectors that count as perpendicular."""

@@ -8,7 +8,6 @@ from mdstopo.case.aims import Response
 from mdstopo.case.common_keys import DIRECTION, FRAME, TRIPLE
 from mdstopo.case.frames import Frames
 from mdstopo.case.kinds import explained
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
 from mdstopo.case.responses import (
     OF_BODY,
@@ -21,7 +20,8 @@ from mdstopo.case.responses import (
     with_since,
 )
 from mdstopo.case.start_rotations import unit
-from mdstopo.case.words import inside
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside
 
 _COMPONENTS = explained({"x": "along x", "y": "along y", "z": "along z", "norm": "the length of the vector"})
 _COMPONENT = Key("component", _COMPONENTS, "which part of the vector", default="norm")

@@ -8,8 +8,8 @@ from itertools import pairwise
 from typing import Any
 
 from mdstopo.case.model import Case
-from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.words import inside, number_text
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, number_text
 
 
 def stage_count(case: Case) -> int:

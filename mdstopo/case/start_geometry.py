@@ -10,8 +10,8 @@ from mdstopo.case.coordinates import in_range
 from mdstopo.case.frames import Frames
 from mdstopo.case.memory import BYTES_PER_POINT, total_memory
 from mdstopo.case.model import PointGrid
-from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.words import count_text, inside
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import count_text, inside
 
 
 def build_points(sections: Any, frames: Frames, reading: Reading) -> dict[str, PointGrid]:

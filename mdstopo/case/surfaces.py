@@ -11,11 +11,11 @@ from mdstopo.case.arrays import FloatArray
 from mdstopo.case.coordinates import in_range
 from mdstopo.case.frames import Frames
 from mdstopo.case.model import GROUND, Surface, SurfaceContact
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.schema_surface import SHAPES
 from mdstopo.case.spatial_point_grids import PERPENDICULAR
 from mdstopo.case.start_rotations import frame_along, unit
-from mdstopo.case.words import inside
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside
 
 
 def surface_contact(common: dict[str, Any], on: Fields, frames: Frames, reading: Reading) -> SurfaceContact | None:

@@ -17,10 +17,10 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray, read_only
 from mdstopo.case.kinds import Schema
-from mdstopo.case.nodes import SCALAR, Node
-from mdstopo.case.reading import BAD, Reading, found
+from mdstopo.case.text.nodes import SCALAR, Node
+from mdstopo.case.text.reading import BAD, Reading, found
+from mdstopo.case.text.words import shown
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import shown
 
 PIECES = 16
 """Straight pieces that stand for a curve."""

@@ -8,10 +8,10 @@ from typing import Any
 from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.kinds import NUMBER
-from mdstopo.case.nodes import MAPPING, Node
-from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import ByShape, Key, ListOf, Record
-from mdstopo.case.words import inside
+from mdstopo.case.text.nodes import MAPPING, Node
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.parser import TIME, parse
 

@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.key_paths import led_to, number_at, stands, why_fixed
 from mdstopo.case.measures import MEASURES, OF_LIMITS, OF_OBJECTIVES, having
 from mdstopo.case.model import ResponseRow, VolumeRow
-from mdstopo.case.nodes import Node
 from mdstopo.case.number_distributions import DISTRIBUTIONS, ROUNDED, Distribution, scaled_to_one
-from mdstopo.case.overrides import WrongPathError, as_yaml, steps_of
-from mdstopo.case.reading import BAD, Fields, Reading, found, is_good
+from mdstopo.case.text.key_paths import led_to, number_at, stands, why_fixed
+from mdstopo.case.text.nodes import Node
+from mdstopo.case.text.overrides import WrongPathError, as_yaml, steps_of
+from mdstopo.case.text.reading import BAD, Fields, Reading, found, is_good
+from mdstopo.case.text.words import inside, listed, number_text, shown
 from mdstopo.case.uncertain import Measure, Scenario, UncertainNumber, Uncertainty
-from mdstopo.case.words import inside, listed, number_text, shown
 
 #: points that an interval of confidence needs at least
 LEAST_VALIDATION = 30

@@ -9,8 +9,8 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.candidates import most_cost
 from mdstopo.case.model import MemberGroup, Variable, VolumeRow
-from mdstopo.case.reading import Reading
-from mdstopo.case.words import listed, number_text
+from mdstopo.case.text.reading import Reading
+from mdstopo.case.text.words import listed, number_text
 
 ROUNDING = 1e-12
 """Sums are compared up to this share of them: 1020 x 0.001 may be spent exactly."""

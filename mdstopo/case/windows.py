@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.words import inside, number_text
+from mdstopo.case.text.reading import BAD, Fields, Reading
+from mdstopo.case.text.words import inside, number_text
 
 DEFAULT = "default"
 

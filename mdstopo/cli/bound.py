@@ -80,7 +80,7 @@ def document(each: "Compared") -> dict[str, Any]:
 
 def result_bounds(view: "ResultView") -> "tuple[Case, dict[str, Compared]] | None":
     """The case of a result of run or pareto, and its bounds beside its best; None where there is no bound to tell."""
-    from mdstopo.case.errors import CaseError
+    from mdstopo.case.text.errors import CaseError
     from mdstopo.limiting.compare import compared
     from mdstopo.store.stored_case import case_of
 

@@ -5,15 +5,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdstopo.case.words import count_text
+from mdstopo.case.text.words import count_text
 from mdstopo.cli.options import announce_compilation, case_argument, output_options, set_option
 from mdstopo.cli.output import Output, number
 from mdstopo.cli.uncertain_numbers import say_sample
 from mdstopo.shown import counted
 
 if TYPE_CHECKING:
-    from mdstopo.case.errors import CaseError
     from mdstopo.case.model import Case
+    from mdstopo.case.text.errors import CaseError
     from mdstopo.engine import Evaluator
 
 _SOFT_BRANCH = (
@@ -32,7 +32,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     Nothing is optimised; one evaluation tells what each costs. What cannot be computed yet is listed with its place
     (exit status 2).
     """
-    from mdstopo.case.errors import CaseError
+    from mdstopo.case.text.errors import CaseError
     from mdstopo.scene.refusals import refusals
 
     output = Output(json=as_json, quiet=quiet)
@@ -51,8 +51,8 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
 
 def _read(output: Output, case_path: Path, overrides: dict[str, str]) -> "Case":
     """The case; its mistakes are printed where it has some (CaseError)."""
-    from mdstopo.case.errors import CaseError
     from mdstopo.case.reader import load_case
+    from mdstopo.case.text.errors import CaseError
 
     try:
         return load_case(case_path, overrides)

@@ -144,10 +144,10 @@ def command(
 
 def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str, ...], history: bool) -> "Case":
     """The case as the methods need it; raises CaseError where they cannot be applied."""
-    from mdstopo.case.errors import CaseError
     from mdstopo.case.integrators import AUTO
     from mdstopo.case.integrators import having as integrators_having
-    from mdstopo.case.words import listed
+    from mdstopo.case.text.errors import CaseError
+    from mdstopo.case.text.words import listed
     from mdstopo.scene.refusals import no_derivatives
 
     refused = [method for method in methods if not SENSITIVITIES[method].by_parameters]

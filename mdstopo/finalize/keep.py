@@ -9,10 +9,10 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
 from mdstopo.case.design_space import slots_of
-from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case, Variable, VolumeRow
+from mdstopo.case.text.errors import CaseError, Mistake
+from mdstopo.case.text.words import count_text, number_text, shown
 from mdstopo.case.volume import ROUNDING, prices
-from mdstopo.case.words import count_text, number_text, shown
 from mdstopo.finalize.apart import part, with_own
 
 

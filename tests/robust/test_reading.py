@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.number_distributions import Normal
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.case.uncertain import Measure
 from mdstopo.evaluators import evaluator_of
 from mdstopo.store.same_case import describe, differences

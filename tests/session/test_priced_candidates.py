@@ -10,9 +10,9 @@ import pytest
 
 from mdstopo.case import candidates
 from mdstopo.case.candidates import coincident, with_members
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.optimizer.scalarisation import Scalarisation

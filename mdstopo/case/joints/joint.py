@@ -7,9 +7,9 @@ from typing import Any, ClassVar, NamedTuple
 from mdstopo.case.arrays import Components, Pair
 from mdstopo.case.common_keys import PAIR
 from mdstopo.case.kinds import Name, Ref, Word
-from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.records import ByName, ByShape, Key, Record, Vector
 from mdstopo.case.rigid_bodies import AnyBody
+from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.value import Value, frozen
 
 _OWN = ByName("body", PAIR, "[x, y]")

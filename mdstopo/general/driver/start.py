@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.general.driver.since_settled import SinceSettled
 from mdstopo.general.model.general_model import COUNT, DESIGN, START
 from mdstopo.mechanics.joints.joint_table import describe

@@ -6,7 +6,7 @@ from pathlib import Path
 
 def folder() -> Path:
     """The folder of the cases that come with the package."""
-    package = Path(__file__).parent.parent
+    package = Path(__file__).parents[2]
     inside = package / "cases"
     return inside if inside.is_dir() else package.parent / "cases"
 

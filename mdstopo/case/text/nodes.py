@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from mdstopo.case.errors import Mistake
-from mdstopo.case.scalars import Scalar, resolve
-from mdstopo.case.words import count_text, inside, shown
+from mdstopo.case.text.errors import Mistake
+from mdstopo.case.text.scalars import Scalar, resolve
+from mdstopo.case.text.words import count_text, inside, shown
 
 SCALAR, SEQUENCE, MAPPING = "scalar", "sequence", "mapping"
 DEEPEST = 50

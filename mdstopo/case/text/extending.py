@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mdstopo.case.errors import Mistake
-from mdstopo.case.file_text import FileTextError, text_in
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, YamlSyntaxError, parse
-from mdstopo.case.reading import Reading, found
-from mdstopo.case.words import shown
-from mdstopo.case.yaml_text import text_of
+from mdstopo.case.text.errors import Mistake
+from mdstopo.case.text.file_text import FileTextError, text_in
+from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node, YamlSyntaxError, parse
+from mdstopo.case.text.reading import Reading, found
+from mdstopo.case.text.words import shown
+from mdstopo.case.text.yaml_text import text_of
 
 KEY = "extends"
 DEEPEST = 10

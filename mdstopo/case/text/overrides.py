@@ -8,9 +8,9 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from mdstopo.case.errors import Mistake
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, YamlSyntaxError, parse
-from mdstopo.case.words import count_text, inside, shown
+from mdstopo.case.text.errors import Mistake
+from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node, YamlSyntaxError, parse
+from mdstopo.case.text.words import count_text, inside, shown
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[([0-9]{1,9})\]")
 

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mdstopo.case.overrides import as_yaml
-from mdstopo.case.scalars import resolve
+from mdstopo.case.text.overrides import as_yaml
+from mdstopo.case.text.scalars import resolve
 
 LONGEST = 118
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")

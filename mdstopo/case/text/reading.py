@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.errors import Mistake
-from mdstopo.case.marks import Marks, enclosing
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
-from mdstopo.case.words import GROUND, did_you_mean, listed, shown
+from mdstopo.case.text.errors import Mistake
+from mdstopo.case.text.marks import Marks, enclosing
+from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.text.words import GROUND, did_you_mean, listed, shown
 
 MOST_MISTAKES = 1000
 

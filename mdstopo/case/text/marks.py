@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.errors import Mistake
+from mdstopo.case.text.errors import Mistake
 from mdstopo.case.value import Value, frozen
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterator, Sequence
 
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
-from mdstopo.case.overrides import WrongPathError, steps_of
-from mdstopo.case.scalars import to_float
-from mdstopo.case.words import did_you_mean, inside, listed, shown
+from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.text.overrides import WrongPathError, steps_of
+from mdstopo.case.text.scalars import to_float
+from mdstopo.case.text.words import did_you_mean, inside, listed, shown
 
 #: sections whose numbers say what the problem is
 SECTIONS = {

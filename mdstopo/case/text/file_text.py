@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from mdstopo.case.errors import Mistake
+from mdstopo.case.text.errors import Mistake
 
 
 class FileTextError(Exception):
