@@ -6,7 +6,7 @@ from dataclasses import Field
 from typing import Any
 
 from mdstopo.case.candidates import unlike
-from mdstopo.case.kinds import Number
+from mdstopo.case.keys.kinds import Number
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Follows, Law, MemberGroup, Variable
 from mdstopo.case.text.nodes import Node

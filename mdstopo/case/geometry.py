@@ -12,7 +12,7 @@ from mdstopo.case.text.reading import Fields, Reading
 
 if TYPE_CHECKING:
     from mdstopo.case.joints.joint import Joint
-    from mdstopo.case.records import Record
+    from mdstopo.case.keys.records import Record
 
 
 class Geometry(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.number_rows import FileName
+from mdstopo.case.keys.number_rows import FileName
 from mdstopo.case.responses import OF_OTHERS
 from mdstopo.case.schema_case import FORMAT
 from mdstopo.case.schema_scene import LAW

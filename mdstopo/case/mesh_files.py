@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, read_only
-from mdstopo.case.number_rows import FileName
+from mdstopo.case.keys.number_rows import FileName
 from mdstopo.case.text.nodes import Node
 from mdstopo.case.text.reading import BAD, Reading
 from mdstopo.case.text.words import shown

@@ -9,9 +9,9 @@ import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from mdstopo.case.kinds import NUMBER, POSITIVE, Kind
-from mdstopo.case.number_rows import Rows
-from mdstopo.case.records import Key, Record
+from mdstopo.case.keys.kinds import NUMBER, POSITIVE, Kind
+from mdstopo.case.keys.number_rows import Rows
+from mdstopo.case.keys.records import Key, Record
 from mdstopo.case.text.reading import Reading
 from mdstopo.case.text.words import inside, number_text
 from mdstopo.case.value import Value, frozen

@@ -14,7 +14,6 @@ from typing import Any
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.candidates import with_start_set
 from mdstopo.case.contacts import build_contacts
-from mdstopo.case.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.dimensions import geometry_in
 from mdstopo.case.fitting import Fit
@@ -22,6 +21,7 @@ from mdstopo.case.frames import Frames
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.groups import build_groups
+from mdstopo.case.keys.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.links import build_bushings, build_joints, declare_joints
 from mdstopo.case.loading import build_load_cases
 from mdstopo.case.model import GROUND, Case

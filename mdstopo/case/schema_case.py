@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.common_keys import GROUP, PAIR
-from mdstopo.case.definitions import DEFINED_NAME, Definitions
 from mdstopo.case.integrators import names as integrators
-from mdstopo.case.kinds import (
+from mdstopo.case.keys.common_keys import GROUP, PAIR
+from mdstopo.case.keys.definitions import DEFINED_NAME, Definitions
+from mdstopo.case.keys.kinds import (
     NOT_NEGATIVE,
     NUMBER,
     POSITIVE,
@@ -25,10 +25,10 @@ from mdstopo.case.kinds import (
     Version,
     explained,
 )
-from mdstopo.case.number_rows import FileName
+from mdstopo.case.keys.number_rows import FileName
+from mdstopo.case.keys.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.over_time import DEFAULT_REDUCTION
 from mdstopo.case.over_time import names as reductions
-from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.responses import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_fit import fit_record

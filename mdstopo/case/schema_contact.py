@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.common_keys import BODY, FRAME, PAIR
-from mdstopo.case.kinds import NOT_NEGATIVE, POSITIVE, Name, Ref
-from mdstopo.case.records import Key, Record
+from mdstopo.case.keys.common_keys import BODY, FRAME, PAIR
+from mdstopo.case.keys.kinds import NOT_NEGATIVE, POSITIVE, Name, Ref
+from mdstopo.case.keys.records import Key, Record
 
 EDGE = Record(
     "an edge",

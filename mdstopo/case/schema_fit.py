@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.kinds import NUMBER, POSITIVE, Kind, Number, Schema, explained
+from mdstopo.case.keys.kinds import NUMBER, POSITIVE, Kind, Number, Schema, explained
+from mdstopo.case.keys.number_rows import FileName
+from mdstopo.case.keys.records import ByShape, Key, Named, Record
 from mdstopo.case.losses import DEFAULT_LOSS
 from mdstopo.case.losses import names as losses
-from mdstopo.case.number_rows import FileName
-from mdstopo.case.records import ByShape, Key, Named, Record
 from mdstopo.case.schema_uncertainty import ByKey
 from mdstopo.case.text.nodes import SCALAR, Node
 from mdstopo.case.text.reading import BAD, Reading, found

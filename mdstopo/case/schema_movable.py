@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.common_keys import PAIR
-from mdstopo.case.kinds import POSITIVE
-from mdstopo.case.records import Key, Record, Vector
+from mdstopo.case.keys.common_keys import PAIR
+from mdstopo.case.keys.kinds import POSITIVE
+from mdstopo.case.keys.records import Key, Record, Vector
 
 _AROUND = Key(
     "around",

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from mdstopo.case.common_keys import FRAME, PAIR, TRIPLE
-from mdstopo.case.kinds import POSITIVE, Kind
+from mdstopo.case.keys.common_keys import FRAME, PAIR, TRIPLE
+from mdstopo.case.keys.kinds import POSITIVE, Kind
+from mdstopo.case.keys.number_rows import Rows
+from mdstopo.case.keys.records import ByShape, Key, ListOf, Record, Vector
 from mdstopo.case.mesh_files import MeshFaces
-from mdstopo.case.number_rows import Rows
-from mdstopo.case.records import ByShape, Key, ListOf, Record, Vector
 from mdstopo.case.svg_path import SvgPath
 
 _MIDDLE = "the centre of mass"

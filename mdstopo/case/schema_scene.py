@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 
-from mdstopo.case.common_keys import BODY, COUNT, FRAME, FRAMES, IN_SPACE, PAIR
-from mdstopo.case.distributions import Brought, BroughtError
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.joints.joint import BODIES, POINT
 from mdstopo.case.joints.joint import record_of as record_of_joint
-from mdstopo.case.kinds import (
+from mdstopo.case.keys.brought_records import Brought, BroughtError
+from mdstopo.case.keys.common_keys import BODY, COUNT, FRAME, FRAMES, IN_SPACE, PAIR
+from mdstopo.case.keys.kinds import (
     NOT_NEGATIVE,
     NUMBER,
     POSITIVE,
@@ -21,10 +21,10 @@ from mdstopo.case.kinds import (
     ScalarInPlane,
     explained,
 )
+from mdstopo.case.keys.number_rows import Rows, Signals
+from mdstopo.case.keys.records import ByShape, Key, ListOf, Record, Tagged, Vector
 from mdstopo.case.laws import LAWS, enter_law
 from mdstopo.case.laws.law import record_of as record_of_law
-from mdstopo.case.number_rows import Rows, Signals
-from mdstopo.case.records import ByShape, Key, ListOf, Record, Tagged, Vector
 from mdstopo.case.schema_movable import MOVABLE
 from mdstopo.case.schema_outline import OUTLINE
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.common_keys import BODY, DIRECTION, FRAME, TRIPLE
-from mdstopo.case.kinds import POSITIVE, Flag
-from mdstopo.case.records import Key, Record, Vector
+from mdstopo.case.keys.common_keys import BODY, DIRECTION, FRAME, TRIPLE
+from mdstopo.case.keys.kinds import POSITIVE, Flag
+from mdstopo.case.keys.records import Key, Record, Vector
 
 _CENTER = Key("center", TRIPLE, "centre", required=True, unit="m")
 _RADIUS = Key("radius", POSITIVE, "radius", required=True, unit="m")

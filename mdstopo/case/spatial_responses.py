@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mdstopo.case.aims import Response
-from mdstopo.case.common_keys import DIRECTION, FRAME, TRIPLE
 from mdstopo.case.frames import Frames
-from mdstopo.case.kinds import explained
-from mdstopo.case.records import Key, Record
+from mdstopo.case.keys.common_keys import DIRECTION, FRAME, TRIPLE
+from mdstopo.case.keys.kinds import explained
+from mdstopo.case.keys.records import Key, Record
 from mdstopo.case.responses import (
     OF_BODY,
     RELATIVE,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, read_only
-from mdstopo.case.kinds import Schema
+from mdstopo.case.keys.kinds import Schema
 from mdstopo.case.text.nodes import SCALAR, Node
 from mdstopo.case.text.reading import BAD, Reading, found
 from mdstopo.case.text.words import shown

@@ -20,8 +20,8 @@ def command(section: str | None, space: bool, out: Path | None) -> int:
     typed. With SECTION, a key of the case such as objectives, its keys are
     listed in words; `case` lists the sections.
     """
-    from mdstopo.case.distributions import BroughtError
     from mdstopo.case.json_schema import ask_distributions, json_schema
+    from mdstopo.case.keys.brought_records import BroughtError
 
     try:
         ask_distributions()

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from mdstopo.case.kinds import NUMBER
+from mdstopo.case.keys.kinds import NUMBER
 from mdstopo.case.model import Table
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError

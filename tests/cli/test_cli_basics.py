@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mdstopo.case.key_tables import places
-from mdstopo.case.records import Record
+from mdstopo.case.keys.records import Record
 from mdstopo.case.schema_case import FORMAT
 from mdstopo.case.schema_space import SPACE_FORMAT
 from mdstopo.cli.commands import COMMANDS, help_text

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mdstopo.case.common_keys import DIRECTION, TRIPLE
-from mdstopo.case.records import ByName, ByShape, Key, Vector
+from mdstopo.case.keys.common_keys import DIRECTION, TRIPLE
+from mdstopo.case.keys.records import ByName, ByShape, Key, Vector
 
 _OWN = ByName("body", TRIPLE, "[x, y, z]")
 _OWN_DIRECTION = ByName("body", DIRECTION, "[x, y, z]")

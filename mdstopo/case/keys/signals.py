@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula, VectorSignal
-from mdstopo.case.time_formula import why_unusable
+from mdstopo.case.keys.time_formula import why_unusable
 
 
 class UnaddedSignalsError(Exception):

@@ -1,12 +1,12 @@
-"""Kinds of lists and mappings, made of other kinds. See `mdstopo.case.kinds`."""
+"""Kinds of lists and mappings, made of other kinds. See `mdstopo.case.keys.kinds`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping
 from typing import Any
 
-from mdstopo.case.distributions import Brought, BroughtError
-from mdstopo.case.kinds import Kind, Name, Schema, Word, check_name
+from mdstopo.case.keys.brought_records import Brought, BroughtError
+from mdstopo.case.keys.kinds import Kind, Name, Schema, Word, check_name
 from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
 from mdstopo.case.text.reading import BAD, Fields, Reading, Reference, found
 from mdstopo.case.text.words import inside, listed, nearest, shown

@@ -1,11 +1,11 @@
-"""Formulas in case files, and what they have names for. See `mdstopo.case.kinds`."""
+"""Formulas in case files, and what they have names for. See `mdstopo.case.keys.kinds`."""
 
 from __future__ import annotations
 
 from collections.abc import Container
 from typing import Any
 
-from mdstopo.case.kinds import Kind, Schema
+from mdstopo.case.keys.kinds import Kind, Schema
 from mdstopo.case.text.nodes import MAPPING, SCALAR, Node
 from mdstopo.case.text.reading import BAD, Reading, found
 from mdstopo.case.text.words import inside, shown

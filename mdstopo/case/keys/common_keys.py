@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mdstopo.case.kinds import NUMBER, Number, Ref, explained
-from mdstopo.case.records import Direction, Key, Vector
+from mdstopo.case.keys.kinds import NUMBER, Number, Ref, explained
+from mdstopo.case.keys.records import Direction, Key, Vector
 
 COUNT = Number(minimum=1, whole=True)
 BODY = Ref("body")

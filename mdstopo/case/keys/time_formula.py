@@ -1,4 +1,4 @@
-"""Quantities that are formulas of time, as case files have them. See `mdstopo.case.kinds`."""
+"""Quantities that are formulas of time, as case files have them. See `mdstopo.case.keys.kinds`."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import re
 from typing import Any
 
 from mdstopo.case.arrays import TimeFormula
-from mdstopo.case.formula_keys import FormulaNames, FormulaText
-from mdstopo.case.kinds import NUMBER
-from mdstopo.case.records import ByShape, Key, ListOf, Record
+from mdstopo.case.keys.formula_keys import FormulaNames, FormulaText
+from mdstopo.case.keys.kinds import NUMBER
+from mdstopo.case.keys.records import ByShape, Key, ListOf, Record
 from mdstopo.case.text.nodes import MAPPING, Node
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Table, read_only
-from mdstopo.case.kinds import Number, Schema, expressible, has_unit, with_unit
-from mdstopo.case.records import Key, Record
+from mdstopo.case.keys.kinds import Number, Schema, expressible, has_unit, with_unit
+from mdstopo.case.keys.records import Key, Record
+from mdstopo.case.keys.time_formula import formula_record, is_expression, is_formula, read_formulas
 from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
 from mdstopo.case.text.reading import BAD, Bad, Fields, Reading, found
 from mdstopo.case.text.scalars import resolve, to_float
 from mdstopo.case.text.words import inside, number_text, shown
-from mdstopo.case.time_formula import formula_record, is_expression, is_formula, read_formulas
 from mdstopo.case.value import Value, frozen
 
 MOST_TOLD = 10
