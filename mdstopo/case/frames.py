@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import Components, FloatArray
-from mdstopo.case.coordinates import in_range
 from mdstopo.case.geometry import Geometry
-from mdstopo.case.rigid_bodies import AnyBody
+from mdstopo.case.geometry.coordinates import in_range
+from mdstopo.case.geometry.rigid_bodies import AnyBody
 from mdstopo.case.text.reading import BAD, Reading
 from mdstopo.case.text.words import GROUND
 from mdstopo.case.value import Value, frozen

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.coordinates import in_range
 from mdstopo.case.frames import Frames
+from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.joints import Joint
 from mdstopo.case.joints.joint import Stated
 from mdstopo.case.model import Bushing, Components

@@ -38,6 +38,7 @@ from mdstopo.case.arrays import (
 )
 from mdstopo.case.design_space import DesignSpace, slots_of
 from mdstopo.case.fitting import Fit
+from mdstopo.case.geometry.rigid_bodies import AnyBody, Body, SpatialBody
 from mdstopo.case.joints import JOINTS, DistanceJoint, FixedJoint, Joint, PrismaticJoint, RevoluteJoint
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.laws import (
@@ -69,7 +70,6 @@ from mdstopo.case.parts import (
     Surface,
     SurfaceContact,
 )
-from mdstopo.case.rigid_bodies import AnyBody, Body, SpatialBody
 from mdstopo.case.text.errors import Mistake
 from mdstopo.case.text.marks import Marks
 from mdstopo.case.text.words import GROUND

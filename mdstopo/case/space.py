@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Triple, VectorSignal
-from mdstopo.case.coordinates import in_range
 from mdstopo.case.geometry import Geometry
+from mdstopo.case.geometry.coordinates import in_range
+from mdstopo.case.geometry.outlines import build_outlines
+from mdstopo.case.geometry.spatial_outlines import SPATIAL
+from mdstopo.case.geometry.spatial_point_grids import check_grid, grid_count, grid_points
+from mdstopo.case.geometry.start_rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
 from mdstopo.case.keys.signals import UnaddedSignalsError, combined
 from mdstopo.case.loading import scaled
 from mdstopo.case.model import GROUND, Load, SpatialBody
-from mdstopo.case.outlines import build_outlines
 from mdstopo.case.prescribed import size_of
 from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
-from mdstopo.case.spatial_outlines import SPATIAL
-from mdstopo.case.spatial_point_grids import check_grid, grid_count, grid_points
-from mdstopo.case.start_rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.surfaces import surface_contact
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, listed, number_text

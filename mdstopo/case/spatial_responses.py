@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from mdstopo.case.aims import Response
 from mdstopo.case.frames import Frames
+from mdstopo.case.geometry.start_rotations import unit
 from mdstopo.case.keys.common_keys import DIRECTION, FRAME, TRIPLE
 from mdstopo.case.keys.kinds import explained
 from mdstopo.case.keys.records import Key, Record
@@ -19,7 +20,6 @@ from mdstopo.case.responses import (
     sees_itself,
     with_since,
 )
-from mdstopo.case.start_rotations import unit
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside
 

@@ -17,9 +17,9 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.dimensions import frames_of
 from mdstopo.case.frames import Frames
+from mdstopo.case.geometry.mesh_files import is_mesh
 from mdstopo.case.keys.definitions import SECTION, with_numbers
 from mdstopo.case.keys.number_rows import rows_in
-from mdstopo.case.mesh_files import is_mesh
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.reader import measured

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
 from mdstopo.case.keys.number_rows import Signals
@@ -20,7 +21,6 @@ from mdstopo.case.keys.signals import UnaddedSignalsError, combined
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.responses import RESPONSES
-from mdstopo.case.start_rotations import about_axis
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.text.overrides import node_of, steps_of
 from mdstopo.case.text.reading import Reading

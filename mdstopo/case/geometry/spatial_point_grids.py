@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.point_grids import evenly, rectangle_sides
-from mdstopo.case.start_rotations import frame_with, parallel, unit
+from mdstopo.case.geometry.point_grids import evenly, rectangle_sides
+from mdstopo.case.geometry.start_rotations import frame_with, parallel, unit
 from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.text.words import inside
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.coordinates import in_range
-from mdstopo.case.rigid_bodies import AnyBody, Outline
+from mdstopo.case.geometry.coordinates import in_range
+from mdstopo.case.geometry.rigid_bodies import AnyBody, Outline
 from mdstopo.case.text.reading import Fields, Reading
 
 CORNERS = 64

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.outlines import Faces, Shape, centre_of, loop, polygon
+from mdstopo.case.geometry.outlines import Faces, Shape, centre_of, loop, polygon
 
 ROUND, RINGS = 24, 12
 """Corners of a circle, and parts from pole to pole."""
