@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from mdstopo import __version__, load_case
-from mdstopo.case.integrators import INTEGRATORS
+from mdstopo.case.methods.integrators import INTEGRATORS
 from mdstopo.case.text.shipped import names
 from mdstopo.cli.new import templates
 from mdstopo.compiler import store

@@ -8,7 +8,7 @@ from dataclasses import field
 import numpy as np
 
 from mdstopo.case.arrays import Components, FloatArray, FrozenDict, read_only
-from mdstopo.case.over_time import DEFAULT_REDUCTION
+from mdstopo.case.methods.over_time import DEFAULT_REDUCTION
 from mdstopo.case.value import Value, frozen
 from mdstopo.settings.optimizer_presets import DEFAULT_OPTIMIZER
 
@@ -52,7 +52,7 @@ class Response(Value):
 
 @frozen
 class Objective(Value):
-    """What is to be improved. over_time: the name of a record of `case.over_time`; sense: minimize | maximize."""
+    """What is to be improved. over_time: the name of a record of `case.methods.over_time`; sense: minimize | maximize."""
 
     name: str
     response: Response

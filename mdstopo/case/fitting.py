@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mdstopo.case.aims import Response
-from mdstopo.case.losses import DEFAULT_LOSS
+from mdstopo.case.methods.losses import DEFAULT_LOSS
 from mdstopo.case.value import Value, frozen
 
 #: a column of a file: its name in the header line, or its place from 0
@@ -62,7 +62,7 @@ class Series(Value):
 class Fit(Value):
     """The section `fit`.
 
-    loss: how residuals count, the name of a record of `case.losses`. starts: how many, the further ones random by
+    loss: how residuals count, the name of a record of `case.methods.losses`. starts: how many, the further ones random by
     `seed`. confidence: that of the intervals.
     """
 

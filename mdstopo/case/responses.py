@@ -16,7 +16,7 @@ from mdstopo.case.keys.brought_records import Brought
 from mdstopo.case.keys.common_keys import BODY, FRAME, GROUP, IN_SPACE, PAIR
 from mdstopo.case.keys.kinds import Ref, explained
 from mdstopo.case.keys.records import ByShape, Key, Record
-from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
+from mdstopo.case.methods.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, shown

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.integrators import names as integrators
 from mdstopo.case.keys.common_keys import GROUP, PAIR
 from mdstopo.case.keys.definitions import DEFINED_NAME, Definitions
 from mdstopo.case.keys.kinds import (
@@ -27,8 +26,11 @@ from mdstopo.case.keys.kinds import (
 )
 from mdstopo.case.keys.number_rows import FileName
 from mdstopo.case.keys.records import ByName, ByShape, Key, ListOf, Named, Record
-from mdstopo.case.over_time import DEFAULT_REDUCTION
-from mdstopo.case.over_time import names as reductions
+from mdstopo.case.methods.integrators import names as integrators
+from mdstopo.case.methods.over_time import DEFAULT_REDUCTION
+from mdstopo.case.methods.over_time import names as reductions
+from mdstopo.case.methods.sensitivities import AUTO_SENSITIVITY
+from mdstopo.case.methods.sensitivities import names as sensitivities
 from mdstopo.case.responses import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_fit import fit_record
@@ -44,8 +46,6 @@ from mdstopo.case.schema_scene import (
     parameter_words,
 )
 from mdstopo.case.schema_uncertainty import UNCERTAINTY
-from mdstopo.case.sensitivities import AUTO_SENSITIVITY
-from mdstopo.case.sensitivities import names as sensitivities
 from mdstopo.case.text.nodes import SCALAR, Node
 from mdstopo.case.text.reading import Reading
 from mdstopo.case.text.words import listed

@@ -7,8 +7,8 @@ from typing import Any
 from mdstopo.case.keys.kinds import NUMBER, POSITIVE, Kind, Number, Schema, explained
 from mdstopo.case.keys.number_rows import FileName
 from mdstopo.case.keys.records import ByShape, Key, Named, Record
-from mdstopo.case.losses import DEFAULT_LOSS
-from mdstopo.case.losses import names as losses
+from mdstopo.case.methods.losses import DEFAULT_LOSS
+from mdstopo.case.methods.losses import names as losses
 from mdstopo.case.schema_uncertainty import ByKey
 from mdstopo.case.text.nodes import SCALAR, Node
 from mdstopo.case.text.reading import BAD, Reading, found

@@ -6,9 +6,9 @@ from typing import Any
 
 from mdstopo.case.keys.kinds import NOT_NEGATIVE, Kind, Number, Schema, explained
 from mdstopo.case.keys.records import ByName, Key, Named, Record
-from mdstopo.case.measures import having
-from mdstopo.case.measures import names as measures
-from mdstopo.case.number_distributions import DISTRIBUTIONS
+from mdstopo.case.methods.measures import having
+from mdstopo.case.methods.measures import names as measures
+from mdstopo.case.methods.number_distributions import DISTRIBUTIONS
 from mdstopo.case.text.nodes import MAPPING, SEQUENCE, Node
 from mdstopo.case.text.reading import BAD, Reading, found
 from mdstopo.case.text.words import inside, listed

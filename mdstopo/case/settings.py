@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.integrators import AUTO, INTEGRATORS, having
+from mdstopo.case.methods.integrators import AUTO, INTEGRATORS, having
+from mdstopo.case.methods.sensitivities import chosen
 from mdstopo.case.model import OptimizerSettings, SolverSettings
-from mdstopo.case.sensitivities import chosen
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import count_text, inside, listed, number_text
 from mdstopo.case.windows import Window

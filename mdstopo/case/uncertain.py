@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import field
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.measures import MEASURES, MeasureKind
-from mdstopo.case.number_distributions import Distribution
+from mdstopo.case.methods.measures import MEASURES, MeasureKind
+from mdstopo.case.methods.number_distributions import Distribution
 from mdstopo.case.value import Value, frozen
 
 
@@ -33,7 +33,7 @@ class Scenario(Value):
 
 @frozen
 class Measure(Value):
-    """What the values at all points of a sample become: the name of a record of `case.measures`, with `factor` and
+    """What the values at all points of a sample become: the name of a record of `case.methods.measures`, with `factor` and
     `level` where these are part of it."""
 
     name: str
@@ -47,7 +47,7 @@ class Measure(Value):
 
     @property
     def kind(self) -> MeasureKind:
-        """The record of the measure (`case.measures`)."""
+        """The record of the measure (`case.methods.measures`)."""
         return MEASURES[self.name]
 
     @property

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.measures import MEASURES, OF_LIMITS, OF_OBJECTIVES, having
+from mdstopo.case.methods.measures import MEASURES, OF_LIMITS, OF_OBJECTIVES, having
+from mdstopo.case.methods.number_distributions import DISTRIBUTIONS, ROUNDED, Distribution, scaled_to_one
 from mdstopo.case.model import ResponseRow, VolumeRow
-from mdstopo.case.number_distributions import DISTRIBUTIONS, ROUNDED, Distribution, scaled_to_one
 from mdstopo.case.text.key_paths import led_to, number_at, stands, why_fixed
 from mdstopo.case.text.nodes import Node
 from mdstopo.case.text.overrides import WrongPathError, as_yaml, steps_of

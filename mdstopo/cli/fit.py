@@ -255,7 +255,7 @@ def _remarks(run: "FitRun") -> list[str]:
     if run.statistics is None:
         return []
     told = []
-    from mdstopo.case.losses import LOSSES
+    from mdstopo.case.methods.losses import LOSSES
     from mdstopo.fit.least_squares import stated_deviations
 
     known = not math.isnan(float(stated_deviations(run.problem).max()))

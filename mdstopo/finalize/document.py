@@ -20,8 +20,8 @@ from mdstopo.case.frames import Frames
 from mdstopo.case.geometry.mesh_files import is_mesh
 from mdstopo.case.keys.definitions import SECTION, with_numbers
 from mdstopo.case.keys.number_rows import rows_in
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
-from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.reader import measured
 from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
 from mdstopo.case.text.overrides import apply_overrides

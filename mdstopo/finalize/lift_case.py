@@ -18,8 +18,8 @@ from mdstopo.case.joints import JOINTS
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
 from mdstopo.case.keys.number_rows import Signals
 from mdstopo.case.keys.signals import UnaddedSignalsError, combined
+from mdstopo.case.methods.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.model import GROUND, Case
-from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.responses import RESPONSES
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.text.overrides import node_of, steps_of

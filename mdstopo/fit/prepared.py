@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup, Objective, Variable
-from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError, Mistake
 from mdstopo.case.text.words import inside

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from mdstopo.case.number_distributions import Normal
+from mdstopo.case.methods.number_distributions import Normal
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.uncertain import Measure

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.case.over_time import ReductionKind
+from mdstopo.case.methods.over_time import ReductionKind
 from mdstopo.general.model.general_model import COUNT, GROUP, MEMBER_FORCE, OFFSET, SUBJECT
 from mdstopo.general.peaks.peak_search import ALIKE, EVEN, MARGIN
 from mdstopo.general.responses.extremes import FRACTIONS, row_of

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdstopo.case.memory import most_floats, room_factor
+from mdstopo.case.methods.over_time import ReductionKind
+from mdstopo.case.methods.sensitivities import SENSITIVITIES
 from mdstopo.case.model import GROUND, Case, Joint, MemberGroup
-from mdstopo.case.over_time import ReductionKind
 from mdstopo.case.responses import kind_of
-from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.case.text.errors import CaseError
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.driver.competing_members import compete, members_peaks

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.methods.over_time import REDUCTIONS, ReductionKind
 from mdstopo.case.model import GROUND, Case, LoadCase, MemberGroup, Response, ResponseRow
-from mdstopo.case.over_time import REDUCTIONS, ReductionKind
 from mdstopo.case.responses import kind_of
 from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import allowed
