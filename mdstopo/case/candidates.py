@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.aims import VolumeRow
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.objects.aims import VolumeRow
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, MemberGroup
-    from mdstopo.case.parts import Candidates
+    from mdstopo.case.objects.parts import Candidates
 
 ROUNDING = 1e-12
 """Lengths are compared up to this share of the coordinates they come from: 0.3 includes 0.1 + 0.2."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.frames import Frames
-from mdstopo.case.geometry import Geometry
 from mdstopo.case.model import GROUND, Case
+from mdstopo.case.objects.frames import Frames
+from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.text.nodes import SCALAR, Node
 from mdstopo.case.text.reading import Reading
 from mdstopo.case.text.words import listed

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.parts import MemberGroup
+from mdstopo.case.objects.parts import MemberGroup
 
 #: on which end of the members points take each other's places
 Side = Literal["from", "to"]

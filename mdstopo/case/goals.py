@@ -11,9 +11,9 @@ import numpy as np
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.candidates import coefficients_of
 from mdstopo.case.catalogue import with_catalogue
-from mdstopo.case.frames import Frames
 from mdstopo.case.methods.over_time import DEFAULT_REDUCTION
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
+from mdstopo.case.objects.frames import Frames
 from mdstopo.case.responses import response_of
 from mdstopo.case.schema_case import SENSES
 from mdstopo.case.stages import check_powers, lowest, powers_of

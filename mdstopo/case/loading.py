@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from mdstopo.case.arrays import Signal, Table, TimeFormula, VectorSignal
-from mdstopo.case.frames import Frames
 from mdstopo.case.model import GROUND, AnyBody, Components, Load, LoadCase, Motion
 from mdstopo.case.motions import Start
+from mdstopo.case.objects.frames import Frames
 from mdstopo.case.prescribed import size_of
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, number_text

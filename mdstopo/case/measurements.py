@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.fitting import Column, Series
 from mdstopo.case.keys.number_rows import MOST_TOLD, cells_of, number_in
 from mdstopo.case.model import Case
+from mdstopo.case.objects.fitting import Column, Series
 from mdstopo.case.text.errors import CaseError, Mistake
 from mdstopo.case.text.reading import Reading
 from mdstopo.case.text.words import did_you_mean, inside, listed, number_text, shown

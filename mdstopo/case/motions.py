@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.geometry import Geometry
 from mdstopo.case.model import GROUND, Motion
+from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.prescribed import AGREE, agree, position_at_start, prescribed, rate_at_start, size_of
 from mdstopo.case.prescribed_rotation import prescribed_rotation, turning_rate_at_start
 from mdstopo.case.text.reading import BAD, Fields, Reading

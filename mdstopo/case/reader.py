@@ -16,9 +16,6 @@ from mdstopo.case.candidates import with_start_set
 from mdstopo.case.contacts import build_contacts
 from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.dimensions import geometry_in
-from mdstopo.case.fitting import Fit
-from mdstopo.case.frames import Frames
-from mdstopo.case.geometry import Geometry
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.groups import build_groups
 from mdstopo.case.keys.definitions import MARK, SECTION, beginning, with_numbers
@@ -27,6 +24,9 @@ from mdstopo.case.loading import build_load_cases
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.movable import build_movable
+from mdstopo.case.objects.fitting import Fit
+from mdstopo.case.objects.frames import Frames
+from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
 from mdstopo.case.start_geometry import build_points
 from mdstopo.case.text.errors import CaseError, Mistake

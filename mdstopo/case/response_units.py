@@ -1,7 +1,7 @@
 """Units of responses, for axes and attributes."""
 
-from mdstopo.case.aims import Objective, Response, ResponseRow
 from mdstopo.case.methods.over_time import REDUCTIONS
+from mdstopo.case.objects.aims import Objective, Response, ResponseRow
 from mdstopo.case.responses import kind_of
 
 

@@ -9,14 +9,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from mdstopo.case.aims import Response
 from mdstopo.case.expression_response import expression_keys, make_expression
-from mdstopo.case.frames import Frames
 from mdstopo.case.keys.brought_records import Brought
 from mdstopo.case.keys.common_keys import BODY, FRAME, GROUP, IN_SPACE, PAIR
 from mdstopo.case.keys.kinds import Ref, explained
 from mdstopo.case.keys.records import ByShape, Key, Record
 from mdstopo.case.methods.over_time import DEFAULT_REDUCTION, REDUCTIONS
+from mdstopo.case.objects.aims import Response
+from mdstopo.case.objects.frames import Frames
 from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, shown

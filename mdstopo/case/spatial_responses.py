@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mdstopo.case.aims import Response
-from mdstopo.case.frames import Frames
-from mdstopo.case.geometry.start_rotations import unit
 from mdstopo.case.keys.common_keys import DIRECTION, FRAME, TRIPLE
 from mdstopo.case.keys.kinds import explained
 from mdstopo.case.keys.records import Key, Record
+from mdstopo.case.objects.aims import Response
+from mdstopo.case.objects.frames import Frames
+from mdstopo.case.geometry.start_rotations import unit
 from mdstopo.case.responses import (
     OF_BODY,
     RELATIVE,

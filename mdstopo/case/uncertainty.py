@@ -10,12 +10,12 @@ from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.methods.measures import MEASURES, OF_LIMITS, OF_OBJECTIVES, having
 from mdstopo.case.methods.number_distributions import DISTRIBUTIONS, ROUNDED, Distribution, scaled_to_one
 from mdstopo.case.model import ResponseRow, VolumeRow
+from mdstopo.case.objects.uncertain import Measure, Scenario, UncertainNumber, Uncertainty
 from mdstopo.case.text.key_paths import led_to, number_at, stands, why_fixed
 from mdstopo.case.text.nodes import Node
 from mdstopo.case.text.overrides import WrongPathError, as_yaml, steps_of
 from mdstopo.case.text.reading import BAD, Fields, Reading, found, is_good
 from mdstopo.case.text.words import inside, listed, number_text, shown
-from mdstopo.case.uncertain import Measure, Scenario, UncertainNumber, Uncertainty
 
 #: points that an interval of confidence needs at least
 LEAST_VALIDATION = 30

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mdstopo.case.aims import Objective
 from mdstopo.case.model import Case
+from mdstopo.case.objects.aims import Objective
 from mdstopo.case.response_units import unit_of_value, words
 from mdstopo.case.responses import kind_of
 from mdstopo.limiting.force_limits import restrictions

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mdstopo.case.aims import Objective, Response, ResponseRow
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import GROUND
+from mdstopo.case.objects.aims import Objective, Response, ResponseRow
 from mdstopo.case.response_units import words
 from mdstopo.case.responses import kind_of
 from mdstopo.limiting.known import Cubics, Floats

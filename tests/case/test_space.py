@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mdstopo.case.geometry.start_rotations import about_axis
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mdstopo.case.arrays import Table
-from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS, SpatialDistanceJoint
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.model import Case, Load, SpatialBody

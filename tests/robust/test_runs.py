@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import mdstopo
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.case.reader import read_case
-from mdstopo.case.uncertain import Measure
 from mdstopo.cli import _dispatch
 from mdstopo.evaluators import evaluator_of
 from mdstopo.robust import points_in_workers

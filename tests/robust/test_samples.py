@@ -6,7 +6,7 @@ from scipy import stats
 
 from mdstopo.case.methods.number_distributions import DISTRIBUTIONS as RECORDS
 from mdstopo.case.methods.number_distributions import Discrete, Lognormal, Normal, Uniform
-from mdstopo.case.uncertain import Measure
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.robust.intervals import student
 from mdstopo.robust.robust_measures import estimate
 from mdstopo.robust.sample import check_sample, design_sample, generators, lattice

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from mdstopo.case.geometry.start_rotations import about_axis
 
 import mdstopo
-from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.movable import placed
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError

@@ -15,8 +15,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mdstopo.case.aims import Variable, VolumeRow
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.objects.aims import Variable, VolumeRow
 
 
 class DesignSpace:

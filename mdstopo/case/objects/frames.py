@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import Components, FloatArray
-from mdstopo.case.geometry import Geometry
+from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.geometry.rigid_bodies import AnyBody
 from mdstopo.case.text.reading import BAD, Reading

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mdstopo.case.aims import Response
 from mdstopo.case.methods.losses import DEFAULT_LOSS
+from mdstopo.case.objects.aims import Response
 from mdstopo.case.value import Value, frozen
 
 #: a column of a file: its name in the header line, or its place from 0
