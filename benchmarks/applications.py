@@ -15,7 +15,7 @@ from mdstopo import Case, Evaluation, evaluate, load_case, optimize, simulate
 from mdstopo.bench.tables import Table, significant, verdict
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.case.objects.parts import MemberGroup
-from mdstopo.case.response_units import words
+from mdstopo.case.responses.response_units import words
 from mdstopo.optimizer.scalarisation import Scalarisation
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,8 @@ from mdstopo.case.keys.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind
 from mdstopo.case.keys.number_rows import Rows, Signals
 from mdstopo.case.keys.records import ByDepth, ByShape, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.geometry.mesh_files import MeshFile
-from mdstopo.case.responses import response_kinds
+from mdstopo.case.responses.responses import response_kinds
+from mdstopo.case.responses.spatial_responses import IN_PLANE_ALONE, SPATIAL_RESPONSES
 from mdstopo.case.schema_case import CONSTRAINT, FORMAT, LOAD_CASE_KEY, OBJECTIVE
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_fit import fit_record
@@ -20,7 +21,6 @@ from mdstopo.case.schema_movable import along_line, movable
 from mdstopo.case.schema_outline import OUTLINE_IN_SPACE
 from mdstopo.case.schema_scene import BUSHING, COORDINATE, GROUP_KEYS, LOAD, LOAD_CASE, LOADS, MASS, MOTIONS, POINTS
 from mdstopo.case.schema_surface import SURFACE
-from mdstopo.case.spatial_responses import IN_PLANE_ALONE, SPATIAL_RESPONSES
 
 ZERO = (0.0, 0.0, 0.0)
 

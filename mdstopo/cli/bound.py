@@ -51,7 +51,7 @@ def command(case_path: Path, result_file: Path | None, overrides: dict[str, str]
 
 def say_bounds(output: Output, case: "Case", found: "Mapping[str, Compared]") -> None:
     """A line for each bound, with the best and the gap where they are known, and a sentence on what it is over."""
-    from mdstopo.case.response_units import unit_of_value
+    from mdstopo.case.responses.response_units import unit_of_value
 
     units = {each.name: unit_of_value(each) for each in case.objectives}
     side = {each.name: "at most" if each.sense == "maximize" else "at least" for each in case.objectives}

@@ -172,7 +172,7 @@ def _range(values: list[float]) -> str:
 def _constraint(case: "Case", i: int) -> str:
     """A constraint and its bound in words."""
     from mdstopo.case.model import VolumeRow
-    from mdstopo.case.response_units import words
+    from mdstopo.case.responses.response_units import words
 
     row = case.constraints[i]
     if isinstance(row, VolumeRow):

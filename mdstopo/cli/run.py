@@ -225,7 +225,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     import numpy as np
 
     from mdstopo.case.model import VolumeRow
-    from mdstopo.case.response_units import words
+    from mdstopo.case.responses.response_units import words
     from mdstopo.case.text.words import count_text
     from mdstopo.cli.show import values_text
     from mdstopo.scene.moving_volumes import spent

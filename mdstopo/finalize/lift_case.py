@@ -20,7 +20,7 @@ from mdstopo.case.keys.signals import UnaddedSignalsError, combined
 from mdstopo.case.methods.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.geometry.start_rotations import about_axis
-from mdstopo.case.responses import RESPONSES
+from mdstopo.case.responses.responses import RESPONSES
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.text.overrides import node_of, steps_of
 from mdstopo.case.text.reading import Reading

@@ -7,7 +7,7 @@ import numpy as np
 
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, ResponseRow
-from mdstopo.case.response_units import unit_of_value, words
+from mdstopo.case.responses.response_units import unit_of_value, words
 from mdstopo.case.stages import stage_count
 from mdstopo.limiting.compare import kept_iterates
 from mdstopo.plots.member_forces import Chosen, forces_of

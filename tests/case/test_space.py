@@ -19,8 +19,8 @@ from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS, SpatialDistanceJ
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.model import Case, Load, SpatialBody
 from mdstopo.case.reader import read_case
-from mdstopo.case.response_units import unit_of
-from mdstopo.case.responses import kind_of
+from mdstopo.case.responses.response_units import unit_of
+from mdstopo.case.responses.responses import kind_of
 
 from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL, SPACE, changed, mistakes
 

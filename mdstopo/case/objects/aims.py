@@ -21,7 +21,7 @@ def _none() -> FloatArray:
 class Response(Value):
     """A number of the state of motion, which is followed over time.
 
-    kind: the word of its record (`case.responses`). Fields that a kind does not use are None.
+    kind: the word of its record (`case.responses.responses`). Fields that a kind does not use are None.
     at_local is in body coordinates of `body`; component: x | y | norm, in space also z. numbers: up to four of
     its own for its kernels; of a tilt: its axis, a unit vector in body coordinates. dimension: of the
     case, whose responses have records of their own. since: of a displacement, the place that it counts from,

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from mdstopo.case.expression_response import expression_keys, make_expression
 from mdstopo.case.keys.brought_records import Brought
 from mdstopo.case.keys.common_keys import BODY, FRAME, GROUP, IN_SPACE, PAIR
 from mdstopo.case.keys.kinds import Ref, explained
@@ -17,6 +16,7 @@ from mdstopo.case.keys.records import ByShape, Key, Record
 from mdstopo.case.methods.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.objects.aims import Response
 from mdstopo.case.objects.frames import Frames
+from mdstopo.case.responses.expression_response import expression_keys, make_expression
 from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, shown
@@ -272,7 +272,7 @@ RESPONSES["expression"] = of_expressions(response_kinds(dict(RESPONSES), IN_SPAC
 def responses_in(dimension: int) -> Mapping[str, ResponseKind]:
     """The responses of a plane (2) or of space (3) by their words."""
     if dimension == 3:
-        from mdstopo.case.spatial_responses import SPATIAL_RESPONSES  # most cases are planar
+        from mdstopo.case.responses.spatial_responses import SPATIAL_RESPONSES  # most cases are planar
 
         return SPATIAL_RESPONSES
     return RESPONSES

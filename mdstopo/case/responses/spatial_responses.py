@@ -1,4 +1,4 @@
-"""Responses in space. See `mdstopo.case.responses`."""
+"""Responses in space. See `mdstopo.case.responses.responses`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mdstopo.case.keys.records import Key, Record
 from mdstopo.case.objects.aims import Response
 from mdstopo.case.objects.frames import Frames
 from mdstopo.case.geometry.start_rotations import unit
-from mdstopo.case.responses import (
+from mdstopo.case.responses.responses import (
     OF_BODY,
     RELATIVE,
     RESPONSES,
