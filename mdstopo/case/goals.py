@@ -15,7 +15,7 @@ from mdstopo.case.methods.over_time import DEFAULT_REDUCTION
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.objects.frames import Frames
 from mdstopo.case.responses.responses import response_of
-from mdstopo.case.schema_case import SENSES
+from mdstopo.case.schema.schema_case import SENSES
 from mdstopo.case.stages import check_powers, lowest, powers_of
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, listed, number_text, shown

@@ -18,7 +18,7 @@ from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.geometry.outlines import PLANAR, build_outlines
 from mdstopo.case.geometry.point_grids import grid_count, grid_points
 from mdstopo.case.prescribed import size_of
-from mdstopo.case.schema_case import FORMAT
+from mdstopo.case.schema.schema_case import FORMAT
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, number_text
 

@@ -20,7 +20,7 @@ from mdstopo.case.geometry.spatial_outlines import SPATIAL
 from mdstopo.case.geometry.spatial_point_grids import check_grid, grid_count, grid_points
 from mdstopo.case.geometry.start_rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.prescribed import size_of
-from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
+from mdstopo.case.schema.schema_space import SPACE_FORMAT, ZERO
 from mdstopo.case.surfaces import surface_contact
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, listed, number_text

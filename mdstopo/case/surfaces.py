@@ -13,7 +13,7 @@ from mdstopo.case.objects.frames import Frames
 from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.geometry.spatial_point_grids import PERPENDICULAR
 from mdstopo.case.geometry.start_rotations import frame_along, unit
-from mdstopo.case.schema_surface import SHAPES
+from mdstopo.case.schema.schema_surface import SHAPES
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from mdstopo.case.json_schema import json_schema
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.schema.json_schema import json_schema
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.text.nodes import MAPPING, SEQUENCE, Node, parse
 from tests.tiers import examples

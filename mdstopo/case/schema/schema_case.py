@@ -32,9 +32,9 @@ from mdstopo.case.methods.over_time import names as reductions
 from mdstopo.case.methods.sensitivities import AUTO_SENSITIVITY
 from mdstopo.case.methods.sensitivities import names as sensitivities
 from mdstopo.case.responses.responses import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
-from mdstopo.case.schema_contact import CONTACT
-from mdstopo.case.schema_fit import fit_record
-from mdstopo.case.schema_scene import (
+from mdstopo.case.schema.schema_contact import CONTACT
+from mdstopo.case.schema.schema_fit import fit_record
+from mdstopo.case.schema.schema_scene import (
     BODY_KEYS,
     BUSHING,
     GROUP_KEYS,
@@ -45,7 +45,7 @@ from mdstopo.case.schema_scene import (
     POINTS,
     parameter_words,
 )
-from mdstopo.case.schema_uncertainty import UNCERTAINTY
+from mdstopo.case.schema.schema_uncertainty import UNCERTAINTY
 from mdstopo.case.text.nodes import SCALAR, Node
 from mdstopo.case.text.reading import Reading
 from mdstopo.case.text.words import listed

@@ -13,10 +13,10 @@ from mdstopo.case.keys.records import ByDepth, ByName, ByShape, Direction, Key, 
 from mdstopo.case.laws.expression_law import Parameters
 from mdstopo.case.geometry.mesh_files import MeshFaces, MeshFile
 from mdstopo.case.geometry.svg_path import SvgPath
-from mdstopo.case.schema_case import FORMAT
-from mdstopo.case.schema_fit import ColumnOf
-from mdstopo.case.schema_space import SPACE_FORMAT
-from mdstopo.case.schema_uncertainty import Anything, ByKey
+from mdstopo.case.schema.schema_case import FORMAT
+from mdstopo.case.schema.schema_fit import ColumnOf
+from mdstopo.case.schema.schema_space import SPACE_FORMAT
+from mdstopo.case.schema.schema_uncertainty import Anything, ByKey
 from mdstopo.shown import plural
 
 #: sections of a case in space that have a table on its page

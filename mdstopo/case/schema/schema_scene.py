@@ -1,4 +1,4 @@
-"""Format 1 of the case file: bodies, joints, motions, points, members, loads. See `mdstopo.case.schema_case`."""
+"""Format 1 of the case file: bodies, joints, motions, points, members, loads. See `mdstopo.case.schema.schema_case`."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from mdstopo.case.keys.number_rows import Rows, Signals
 from mdstopo.case.keys.records import ByShape, Key, ListOf, Record, Tagged, Vector
 from mdstopo.case.laws import LAWS, enter_law
 from mdstopo.case.laws.law import record_of as record_of_law
-from mdstopo.case.schema_movable import MOVABLE
-from mdstopo.case.schema_outline import OUTLINE
+from mdstopo.case.schema.schema_movable import MOVABLE
+from mdstopo.case.schema.schema_outline import OUTLINE
 
 MASS = Key("mass", POSITIVE, "mass", required=True, unit="kg")
 BODY_KEYS = Record(

@@ -1,4 +1,4 @@
-"""Format 1 of the case file in space: what differs from the plane. See `mdstopo.case.schema_case`."""
+"""Format 1 of the case file in space: what differs from the plane. See `mdstopo.case.schema.schema_case`."""
 
 from __future__ import annotations
 
@@ -14,13 +14,23 @@ from mdstopo.case.keys.records import ByDepth, ByShape, Key, ListOf, Named, Reco
 from mdstopo.case.geometry.mesh_files import MeshFile
 from mdstopo.case.responses.responses import response_kinds
 from mdstopo.case.responses.spatial_responses import IN_PLANE_ALONE, SPATIAL_RESPONSES
-from mdstopo.case.schema_case import CONSTRAINT, FORMAT, LOAD_CASE_KEY, OBJECTIVE
-from mdstopo.case.schema_contact import CONTACT
-from mdstopo.case.schema_fit import fit_record
-from mdstopo.case.schema_movable import along_line, movable
-from mdstopo.case.schema_outline import OUTLINE_IN_SPACE
-from mdstopo.case.schema_scene import BUSHING, COORDINATE, GROUP_KEYS, LOAD, LOAD_CASE, LOADS, MASS, MOTIONS, POINTS
-from mdstopo.case.schema_surface import SURFACE
+from mdstopo.case.schema.schema_case import CONSTRAINT, FORMAT, LOAD_CASE_KEY, OBJECTIVE
+from mdstopo.case.schema.schema_contact import CONTACT
+from mdstopo.case.schema.schema_fit import fit_record
+from mdstopo.case.schema.schema_movable import along_line, movable
+from mdstopo.case.schema.schema_outline import OUTLINE_IN_SPACE
+from mdstopo.case.schema.schema_scene import (
+    BUSHING,
+    COORDINATE,
+    GROUP_KEYS,
+    LOAD,
+    LOAD_CASE,
+    LOADS,
+    MASS,
+    MOTIONS,
+    POINTS,
+)
+from mdstopo.case.schema.schema_surface import SURFACE
 
 ZERO = (0.0, 0.0, 0.0)
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from mdstopo.case.keys.number_rows import FileName
 from mdstopo.case.responses.responses import OF_OTHERS
-from mdstopo.case.schema_case import FORMAT
-from mdstopo.case.schema_scene import LAW
-from mdstopo.case.schema_space import SPACE_FORMAT
+from mdstopo.case.schema.schema_case import FORMAT
+from mdstopo.case.schema.schema_scene import LAW
+from mdstopo.case.schema.schema_space import SPACE_FORMAT
 
 
 def json_schema() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Format 1 of the case file: the section `fit`. See `mdstopo.case.schema_case`."""
+"""Format 1 of the case file: the section `fit`. See `mdstopo.case.schema.schema_case`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mdstopo.case.keys.number_rows import FileName
 from mdstopo.case.keys.records import ByShape, Key, Named, Record
 from mdstopo.case.methods.losses import DEFAULT_LOSS
 from mdstopo.case.methods.losses import names as losses
-from mdstopo.case.schema_uncertainty import ByKey
+from mdstopo.case.schema.schema_uncertainty import ByKey
 from mdstopo.case.text.nodes import SCALAR, Node
 from mdstopo.case.text.reading import BAD, Reading, found
 from mdstopo.case.value import Value, frozen

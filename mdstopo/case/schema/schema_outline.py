@@ -1,4 +1,4 @@
-"""Format 1 of the case file: what bodies look like in pictures. See `mdstopo.case.schema_case`."""
+"""Format 1 of the case file: what bodies look like in pictures. See `mdstopo.case.schema.schema_case`."""
 
 from __future__ import annotations
 
