@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import Field
 from typing import Any
 
-from mdstopo.case.candidates import unlike
 from mdstopo.case.keys.kinds import Number
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Follows, Law, MemberGroup, Variable
+from mdstopo.case.scene.candidates import unlike
 from mdstopo.case.text.nodes import Node
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, listed, number_text, shown

@@ -12,23 +12,24 @@ from pathlib import Path
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.candidates import with_start_set
-from mdstopo.case.contacts import build_contacts
 from mdstopo.case.design_variables import build_shared, build_variables
-from mdstopo.case.dimensions import geometry_in
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
-from mdstopo.case.groups import build_groups
 from mdstopo.case.keys.definitions import MARK, SECTION, beginning, with_numbers
-from mdstopo.case.links import build_bushings, build_joints, declare_joints
-from mdstopo.case.loading import build_load_cases
 from mdstopo.case.model import GROUND, Case
-from mdstopo.case.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.movable import build_movable
 from mdstopo.case.objects.fitting import Fit
 from mdstopo.case.objects.frames import Frames
 from mdstopo.case.objects.plane_or_space import Geometry
+from mdstopo.case.scene.candidates import with_start_set
+from mdstopo.case.scene.contacts import build_contacts
+from mdstopo.case.scene.dimensions import geometry_in
+from mdstopo.case.scene.groups import build_groups
+from mdstopo.case.scene.links import build_bushings, build_joints, declare_joints
+from mdstopo.case.scene.load_case_times import windows
+from mdstopo.case.scene.loading import build_load_cases
+from mdstopo.case.scene.motions import build_motions, merged, resolve_starts, start_angle
+from mdstopo.case.scene.points import build_points
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
-from mdstopo.case.start_geometry import build_points
 from mdstopo.case.text.errors import CaseError, Mistake
 from mdstopo.case.text.extending import KEY, CannotExtendError, extended, text_of_tree
 from mdstopo.case.text.file_text import FileTextError, text_in
@@ -37,7 +38,6 @@ from mdstopo.case.text.overrides import apply_overrides
 from mdstopo.case.text.reading import BAD, Fields, Reading, found
 from mdstopo.case.text.shipped import case_file, names
 from mdstopo.case.text.words import inside
-from mdstopo.case.windows import windows
 
 _SECTIONS = {
     "body": "bodies",

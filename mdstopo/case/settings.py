@@ -9,9 +9,9 @@ from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.methods.integrators import AUTO, INTEGRATORS, having
 from mdstopo.case.methods.sensitivities import chosen
 from mdstopo.case.model import OptimizerSettings, SolverSettings
+from mdstopo.case.scene.load_case_times import Window
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import count_text, inside, listed, number_text
-from mdstopo.case.windows import Window
 from mdstopo.settings.optimizer_options import OPTIONS
 from mdstopo.settings.optimizers import OPTIMIZERS
 

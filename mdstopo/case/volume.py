@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.candidates import most_cost
 from mdstopo.case.model import MemberGroup, Variable, VolumeRow
+from mdstopo.case.scene.candidates import most_cost
 from mdstopo.case.text.reading import Reading
 from mdstopo.case.text.words import listed, number_text
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mdstopo.case.candidates import mirrored_groups
 from mdstopo.case.methods.integrators import INTEGRATORS
 from mdstopo.case.methods.sensitivities import chosen, having
 from mdstopo.case.model import Case, MemberGroup, Objective, Response, ResponseRow, VolumeRow
+from mdstopo.case.scene.candidates import mirrored_groups
 from mdstopo.case.text.errors import Mistake
 from mdstopo.case.text.words import listed, number_text, shown
 from mdstopo.scene.family import beyond_collocation, beyond_springs

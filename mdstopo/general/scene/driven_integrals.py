@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import Case, LoadCase
-from mdstopo.case.prescribed import KINDS
+from mdstopo.case.scene.prescribed import KINDS
 from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.formulas import FormulaCalls
 from mdstopo.formula.time_formulas import VALUE

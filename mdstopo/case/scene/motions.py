@@ -10,12 +10,12 @@ from typing import Any
 
 from mdstopo.case.model import GROUND, Motion
 from mdstopo.case.objects.plane_or_space import Geometry
-from mdstopo.case.prescribed import AGREE, agree, position_at_start, prescribed, rate_at_start, size_of
-from mdstopo.case.prescribed_rotation import prescribed_rotation, turning_rate_at_start
+from mdstopo.case.scene.load_case_times import Window
+from mdstopo.case.scene.prescribed import AGREE, agree, position_at_start, prescribed, rate_at_start, size_of
+from mdstopo.case.scene.prescribed_rotation import prescribed_rotation, turning_rate_at_start
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, number_text, shown
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.windows import Window
 
 
 @frozen

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray, Table
-from mdstopo.case.candidates import ROUNDING, allowed_lengths, coincident, lengths_between
 from mdstopo.case.laws.law import numbers
 from mdstopo.case.memory import BYTES_PER_MEMBER, total_memory
 from mdstopo.case.model import GROUND, LAWS, Candidates, Law, MemberGroup, PointGrid
 from mdstopo.case.objects.frames import Frames
+from mdstopo.case.scene.candidates import ROUNDING, allowed_lengths, coincident, lengths_between
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import count_text, inside, number_text
 from mdstopo.case.value import Value, frozen

@@ -7,10 +7,19 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Prescribed, PrescribedRotation
 from mdstopo.case.geometry.start_rotations import unit
-from mdstopo.case.prescribed import AGREE, KINDS, agree, position_at_start, prescribed, rate_at_start, size_of, value_at
+from mdstopo.case.scene.load_case_times import Window
+from mdstopo.case.scene.prescribed import (
+    AGREE,
+    KINDS,
+    agree,
+    position_at_start,
+    prescribed,
+    rate_at_start,
+    size_of,
+    value_at,
+)
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, listed, number_text
-from mdstopo.case.windows import Window
 
 ANGLES = ("roll", "pitch", "yaw")
 

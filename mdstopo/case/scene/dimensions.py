@@ -16,10 +16,10 @@ _BEFORE = ("format", "dimension", "title", "extends", "define", "time", "design"
 def geometry_of(dimension: int) -> Geometry:
     """What a case reader has to know of a plane (2) or of space (3)."""
     if dimension == 3:
-        from mdstopo.case.space import SPACE  # most cases are planar
+        from mdstopo.case.scene.space import SPACE  # most cases are planar
 
         return SPACE
-    from mdstopo.case.plane import PLANE  # those in space need none of it
+    from mdstopo.case.scene.plane import PLANE  # those in space need none of it
 
     return PLANE
 

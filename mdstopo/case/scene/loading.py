@@ -8,12 +8,12 @@ from typing import Any
 
 from mdstopo.case.arrays import Signal, Table, TimeFormula, VectorSignal
 from mdstopo.case.model import GROUND, AnyBody, Components, Load, LoadCase, Motion
-from mdstopo.case.motions import Start
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.prescribed import size_of
+from mdstopo.case.scene.load_case_times import DEFAULT, Window
+from mdstopo.case.scene.motions import Start
+from mdstopo.case.scene.prescribed import size_of
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, number_text
-from mdstopo.case.windows import DEFAULT, Window
 
 
 def build_load_cases(

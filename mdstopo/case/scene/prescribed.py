@@ -9,9 +9,9 @@ import numpy as np
 from mdstopo.case.arrays import Signal, Table, TimeFormula
 from mdstopo.case.model import Prescribed
 from mdstopo.case.geometry.spline import value_and_slope
+from mdstopo.case.scene.load_case_times import Window
 from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.text.words import number_text
-from mdstopo.case.windows import Window
 
 AGREE = 1e-8
 """How far, relative to the values at hand, a stated start may lie from a prescribed one."""
