@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from mdstopo.case.exchange import Side, exchange_ends
+from mdstopo.case.design.exchange import Side, exchange_ends
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow, VolumeRow
 from mdstopo.case.objects.design_space import DesignSpace

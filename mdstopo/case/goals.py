@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.catalogue import with_catalogue
+from mdstopo.case.design.catalogue import with_catalogue
+from mdstopo.case.design.stages import check_powers, lowest, powers_of
+from mdstopo.case.design.volume import check_feasible, prices
 from mdstopo.case.methods.over_time import DEFAULT_REDUCTION
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.objects.frames import Frames
@@ -17,10 +19,8 @@ from mdstopo.case.responses.responses import response_of
 from mdstopo.case.scene.candidates import coefficients_of
 from mdstopo.case.scene.load_case_times import DEFAULT
 from mdstopo.case.schema.schema_case import SENSES
-from mdstopo.case.stages import check_powers, lowest, powers_of
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, listed, number_text, shown
-from mdstopo.case.volume import check_feasible, prices
 from mdstopo.settings.scalarisations import SCALARISATIONS
 
 DESIGN_KEYS = ("initial", "lower", "upper", "power")

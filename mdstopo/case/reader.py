@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.design_variables import build_shared, build_variables
+from mdstopo.case.design.design_variables import build_shared, build_variables
+from mdstopo.case.design.movable import build_movable
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.keys.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.model import GROUND, Case
-from mdstopo.case.movable import build_movable
 from mdstopo.case.objects.fitting import Fit
 from mdstopo.case.objects.frames import Frames
 from mdstopo.case.objects.plane_or_space import Geometry

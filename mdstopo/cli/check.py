@@ -252,7 +252,7 @@ def _say_members(output: Output, case: "Case") -> None:
 
 def _say_stages(output: Output, case: "Case") -> list[dict[str, float]]:
     """The powers of each stage that a run goes through, by group; nothing where there is one."""
-    from mdstopo.case.stages import stage_case, stage_count
+    from mdstopo.case.design.stages import stage_case, stage_count
 
     count = stage_count(case)
     if count == 1:

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.design.movable import with_points_fixed
 from mdstopo.case.model import Case
-from mdstopo.case.movable import with_points_fixed
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.text.yaml_text import text_of

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.design.volume import ROUNDING, prices
 from mdstopo.case.model import Case, Variable, VolumeRow
 from mdstopo.case.objects.design_space import slots_of
 from mdstopo.case.text.errors import CaseError, Mistake
 from mdstopo.case.text.words import count_text, number_text, shown
-from mdstopo.case.volume import ROUNDING, prices
 from mdstopo.finalize.apart import part, with_own
 
 

@@ -17,9 +17,9 @@ from dataclasses import replace
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.following import expressions_of
+from mdstopo.case.design.following import expressions_of
+from mdstopo.case.design.movable import placed
 from mdstopo.case.model import Case, Following, MovablePoints, Variable, VolumeRow
-from mdstopo.case.movable import placed
 from mdstopo.case.reader import Document
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.text.words import number_text

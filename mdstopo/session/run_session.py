@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.design.stages import stage_count
 from mdstopo.case.model import Case
-from mdstopo.case.stages import stage_count
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.text.words import count_text
 from mdstopo.evaluators import make_engine

@@ -8,7 +8,7 @@ import yaml
 from mdstopo.case.geometry.start_rotations import about_axis
 
 import mdstopo
-from mdstopo.case.movable import placed
+from mdstopo.case.design.movable import placed
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.finalize.finalize_design import finalize, opened, ready

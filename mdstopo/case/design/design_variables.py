@@ -103,7 +103,7 @@ def build_variables(
         built.append(variable)
     named = [each for each in built if each.defined]
     if named:
-        from mdstopo.case.named_variables import build_follows  # most cases have none
+        from mdstopo.case.design.named_variables import build_follows  # most cases have none
 
         found, follows = build_follows(named, written, top, groups, taken, reading)
         by_name = {each.name: each for each in found}
@@ -116,7 +116,7 @@ def build_variables(
 
 def _build(name: str, fields: Fields, top: Fields, groups: dict[str, MemberGroup], reading: Reading) -> Variable | None:
     if fields["of"] is not None:
-        from mdstopo.case.named_variables import build_named  # most cases have none
+        from mdstopo.case.design.named_variables import build_named  # most cases have none
 
         return build_named(name, fields, top, reading)
     stated = fields["group"]

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, FrozenDict
+from mdstopo.case.design.volume import prices
 from mdstopo.case.model import GROUND, AnyBody, Case, MemberGroup, MovablePoints, PointGrid, Variable, VolumeRow
 from mdstopo.case.objects.frames import Frames
 from mdstopo.case.geometry.coordinates import in_range
@@ -22,7 +23,6 @@ from mdstopo.case.scene.candidates import coefficients_of, lengths_between
 from mdstopo.case.scene.dimensions import frames_of
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, number_text
-from mdstopo.case.volume import prices
 
 #: how far from its region a point may be at first, relative to the size of the coordinates
 OUTSIDE = 1e-9

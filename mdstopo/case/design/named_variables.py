@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, FrozenDict
-from mdstopo.case.following import Expressions, expressions_of
+from mdstopo.case.design.following import Expressions, expressions_of
+from mdstopo.case.design.movable import is_of_use
 from mdstopo.case.keys.definitions import MARK, SECTION, is_kept_as_text
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import MemberGroup
-from mdstopo.case.movable import is_of_use
 from mdstopo.case.objects.aims import Following, Follows, Variable
 from mdstopo.case.text.key_paths import stated_variables
 from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
