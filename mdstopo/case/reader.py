@@ -14,7 +14,6 @@ from typing import Any
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.design.design_variables import build_shared, build_variables
 from mdstopo.case.design.movable import build_movable
-from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.keys.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.objects.fitting import Fit
@@ -29,7 +28,8 @@ from mdstopo.case.scene.load_case_times import windows
 from mdstopo.case.scene.loading import build_load_cases
 from mdstopo.case.scene.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.scene.points import build_points
-from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
+from mdstopo.case.sections.goals import apply_design, build_combine, build_constraints, build_objectives
+from mdstopo.case.sections.settings import build_optimizer, build_solver, warn_assemble
 from mdstopo.case.text.errors import CaseError, Mistake
 from mdstopo.case.text.extending import KEY, CannotExtendError, extended, text_of_tree
 from mdstopo.case.text.file_text import FileTextError, text_in
@@ -143,7 +143,7 @@ class Document:
         assert isinstance(top, Fields)
         parts = _build(top, root, self._written, geometry, reading)
         if top["uncertainty"] is not None:
-            from mdstopo.case.uncertainty import build_uncertainty  # most cases have none
+            from mdstopo.case.sections.uncertainty_section import build_uncertainty  # most cases have none
 
             parts["uncertainty"] = build_uncertainty(top, parts["constraints"], root, reading)
         if reading.mistakes:
@@ -235,7 +235,7 @@ def _build(top: Fields, root: Node, written: Node, geometry: Geometry, reading: 
 def _fit(top: Fields, root: Node, frames: Frames, reading: Reading) -> Fit | None:
     if top["fit"] is None:
         return None
-    from mdstopo.case.fit_section import build_fit  # most cases have none
+    from mdstopo.case.sections.fit_section import build_fit  # most cases have none
 
     return build_fit(top, root, frames, reading)
 
