@@ -15,7 +15,7 @@ from mdstopo.case.design.exchange import Side, exchange_ends
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow, VolumeRow
 from mdstopo.case.objects.design_space import DesignSpace
-from mdstopo.case.responses.responses import kind_of
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.text.errors import CaseError
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample

@@ -24,6 +24,7 @@ from mdstopo.case.arrays import (
     VectorSignal,
     read_only,
 )
+from mdstopo.case.geometry.rigid_bodies import AnyBody, Body, SpatialBody
 from mdstopo.case.joints import JOINTS, DistanceJoint, FixedJoint, Joint, PrismaticJoint, RevoluteJoint
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.laws import (
@@ -69,7 +70,6 @@ from mdstopo.case.objects.parts import (
     Surface,
     SurfaceContact,
 )
-from mdstopo.case.geometry.rigid_bodies import AnyBody, Body, SpatialBody
 from mdstopo.case.objects.uncertain import Uncertainty
 from mdstopo.case.text.errors import Mistake
 from mdstopo.case.text.marks import Marks

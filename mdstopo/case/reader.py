@@ -25,7 +25,7 @@ from mdstopo.case.scene.dimensions import geometry_in
 from mdstopo.case.scene.groups import build_groups
 from mdstopo.case.scene.links import build_bushings, build_joints, declare_joints
 from mdstopo.case.scene.load_case_times import windows
-from mdstopo.case.scene.loading import build_load_cases
+from mdstopo.case.scene.load_cases import build_load_cases
 from mdstopo.case.scene.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.scene.points import build_points
 from mdstopo.case.sections.goals import apply_design, build_combine, build_constraints, build_objectives

@@ -336,7 +336,7 @@ def _alike(found: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str]]
 
 def _say_frequencies(output: Output, case: "Case", found: list[dict[str, Any]]) -> None:
     # on which side of the criterion a case stands is a question of stored energy alone
-    from mdstopo.case.responses.responses import kind_of
+    from mdstopo.case.responses.response_kinds import kind_of
 
     energetic = {objective.load_case for objective in case.objectives if kind_of(objective.response).is_energy}
     for entry, names in _alike(found):

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.geometry.mesh_files import is_mesh
 from mdstopo.case.keys.definitions import SECTION, with_numbers
 from mdstopo.case.keys.number_rows import rows_in
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.geometry.mesh_files import is_mesh
 from mdstopo.case.reader import measured
 from mdstopo.case.scene.dimensions import frames_of
 from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse

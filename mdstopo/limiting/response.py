@@ -10,8 +10,8 @@ import numpy as np
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import GROUND
 from mdstopo.case.objects.aims import Objective, Response, ResponseRow
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.responses.response_units import words
-from mdstopo.case.responses.responses import kind_of
 from mdstopo.limiting.known import Cubics, Floats
 from mdstopo.limiting.system import System
 

@@ -4,7 +4,7 @@ from mdstopo.case.methods.integrators import INTEGRATORS
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.methods.sensitivities import chosen
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
-from mdstopo.case.responses.responses import kind_of
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.scene.candidates import mirrored_groups
 from mdstopo.scene.signal_segments import formulas_of
 

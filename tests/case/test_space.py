@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mdstopo.case.geometry.start_rotations import about_axis
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mdstopo.case.arrays import Table
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS, SpatialDistanceJoint
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.model import Case, Load, SpatialBody
 from mdstopo.case.reader import read_case
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.responses.response_units import unit_of
-from mdstopo.case.responses.responses import kind_of
 
 from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL, SPACE, changed, mistakes
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mdstopo.case.geometry.mesh_files import MeshError, vertices
 from numpy.typing import NDArray
 
+from mdstopo.case.geometry.mesh_files import MeshError, vertices
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.text.errors import CaseError
 

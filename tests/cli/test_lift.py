@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mdstopo.case.geometry.start_rotations import about_axis
 
 import mdstopo
 from mdstopo.case.arrays import Signal, Table, TimeFormula
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.text.errors import CaseError

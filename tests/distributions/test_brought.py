@@ -25,7 +25,7 @@ from mdstopo.case.objects.aims import Response
 from mdstopo.case.keys.kinds import POSITIVE, Ref
 from mdstopo.case.laws.law import Law, free_length_key
 from mdstopo.case.keys.records import Key, Record
-from mdstopo.case.responses.responses import ResponseKind
+from mdstopo.case.responses.response_kinds import ResponseKind
 from mdstopo.case.value import frozen, stated
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from mdstopo.case.geometry.start_rotations import about_axis
 
 import mdstopo
 from mdstopo.case.design.movable import placed
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.finalize.finalize_design import finalize, opened, ready

@@ -14,11 +14,11 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray, FrozenDict
 from mdstopo.case.design.volume import prices
-from mdstopo.case.model import GROUND, AnyBody, Case, MemberGroup, MovablePoints, PointGrid, Variable, VolumeRow
-from mdstopo.case.objects.frames import Frames
 from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.geometry.spatial_point_grids import check_grid
 from mdstopo.case.geometry.start_rotations import frame_with, unit
+from mdstopo.case.model import GROUND, AnyBody, Case, MemberGroup, MovablePoints, PointGrid, Variable, VolumeRow
+from mdstopo.case.objects.frames import Frames
 from mdstopo.case.scene.candidates import coefficients_of, lengths_between
 from mdstopo.case.scene.dimensions import frames_of
 from mdstopo.case.text.reading import BAD, Fields, Reading

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, ClassVar, NamedTuple
 
 from mdstopo.case.arrays import Components, Pair
+from mdstopo.case.geometry.rigid_bodies import AnyBody
 from mdstopo.case.keys.common_keys import PAIR
 from mdstopo.case.keys.kinds import Name, Ref, Word
 from mdstopo.case.keys.records import ByName, ByShape, Key, Record, Vector
-from mdstopo.case.geometry.rigid_bodies import AnyBody
 from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.value import Value, frozen
 

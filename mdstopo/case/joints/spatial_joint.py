@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Triple, read_only
-from mdstopo.case.joints.joint import Joint, Stated
 from mdstopo.case.geometry.start_rotations import frame_along, turning, unit
+from mdstopo.case.joints.joint import Joint, Stated
 from mdstopo.case.text.reading import BAD, Reading
 from mdstopo.case.text.words import inside, listed, shown
 from mdstopo.case.value import frozen

@@ -1,1 +1,2 @@
-"""Methods that a case names by a word: integrators, methods of differentiation, reductions over time, measures, distributions, losses. One record each."""
+"""What a case names by a word, one record each: integrators, methods of differentiation, reductions over time,
+measures, distributions of uncertain numbers, losses of fits."""

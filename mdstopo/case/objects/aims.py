@@ -21,7 +21,7 @@ def _none() -> FloatArray:
 class Response(Value):
     """A number of the state of motion, which is followed over time.
 
-    kind: the word of its record (`case.responses.responses`). Fields that a kind does not use are None.
+    kind: the word of its record (`case.responses.response_kinds`). Fields that a kind does not use are None.
     at_local is in body coordinates of `body`; component: x | y | norm, in space also z. numbers: up to four of
     its own for its kernels; of a tilt: its axis, a unit vector in body coordinates. dimension: of the
     case, whose responses have records of their own. since: of a displacement, the place that it counts from,
@@ -52,7 +52,7 @@ class Response(Value):
 
 @frozen
 class Objective(Value):
-    """What is to be improved. over_time: the name of a record of `case.methods.over_time`; sense: minimize | maximize."""
+    """What is to be improved. over_time: the name of a record of `methods.over_time`; sense: minimize | maximize."""
 
     name: str
     response: Response

@@ -62,7 +62,7 @@ class Series(Value):
 class Fit(Value):
     """The section `fit`.
 
-    loss: how residuals count, the name of a record of `case.methods.losses`. starts: how many, the further ones random by
+    loss: how residuals count, the name of a record of `methods.losses`. starts: how many, the further ones random by
     `seed`. confidence: that of the intervals.
     """
 

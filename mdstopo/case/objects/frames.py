@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import Components, FloatArray
-from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.geometry.rigid_bodies import AnyBody
+from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.text.reading import BAD, Reading
 from mdstopo.case.text.words import GROUND
 from mdstopo.case.value import Value, frozen

@@ -16,8 +16,8 @@ from mdstopo.case.arrays import (
     read_only,
     read_only_index,
 )
-from mdstopo.case.laws import Law
 from mdstopo.case.geometry.rigid_bodies import AnyBody
+from mdstopo.case.laws import Law
 from mdstopo.case.value import Value, frozen
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mdstopo.case.arrays import Components, FloatArray
-from mdstopo.case.objects.parts import AnyContact, Load
 from mdstopo.case.geometry.rigid_bodies import AnyBody
+from mdstopo.case.objects.parts import AnyContact, Load
 from mdstopo.case.text.reading import Fields, Reading
 
 if TYPE_CHECKING:

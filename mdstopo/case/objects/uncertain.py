@@ -33,7 +33,7 @@ class Scenario(Value):
 
 @frozen
 class Measure(Value):
-    """What the values at all points of a sample become: the name of a record of `case.methods.measures`, with `factor` and
+    """What the values at all points of a sample become: the name of a record of `methods.measures`, with `factor` and
     `level` where these are part of it."""
 
     name: str

@@ -2,7 +2,7 @@
 
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.objects.aims import Objective, Response, ResponseRow
-from mdstopo.case.responses.responses import kind_of
+from mdstopo.case.responses.response_kinds import kind_of
 
 
 def unit_of(response: Response) -> str:

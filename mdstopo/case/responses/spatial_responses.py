@@ -1,16 +1,16 @@
-"""Responses in space. See `mdstopo.case.responses.responses`."""
+"""Responses in space. See `mdstopo.case.responses.response_kinds`."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from mdstopo.case.geometry.start_rotations import unit
 from mdstopo.case.keys.common_keys import DIRECTION, FRAME, TRIPLE
 from mdstopo.case.keys.kinds import explained
 from mdstopo.case.keys.records import Key, Record
 from mdstopo.case.objects.aims import Response
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.geometry.start_rotations import unit
-from mdstopo.case.responses.responses import (
+from mdstopo.case.responses.response_kinds import (
     OF_BODY,
     RELATIVE,
     RESPONSES,

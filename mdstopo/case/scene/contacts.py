@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.model import AnyContact, Contact, PointGrid
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, shown
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.joints import Joint
 from mdstopo.case.joints.joint import Stated
 from mdstopo.case.model import Bushing, Components
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, listed, shown
 

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.joints import JOINTS
-from mdstopo.case.model import GROUND, Body, Load, Pair
-from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.geometry.outlines import PLANAR, build_outlines
 from mdstopo.case.geometry.point_grids import grid_count, grid_points
+from mdstopo.case.joints import JOINTS
+from mdstopo.case.model import GROUND, Body, Load, Pair
+from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.scene.contacts import edge_contact
-from mdstopo.case.scene.loading import scaled
+from mdstopo.case.scene.load_cases import scaled
 from mdstopo.case.scene.prescribed import size_of
 from mdstopo.case.schema.schema_case import FORMAT
 from mdstopo.case.text.reading import BAD, Fields, Reading

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.memory import BYTES_PER_POINT, total_memory
 from mdstopo.case.model import PointGrid
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import count_text, inside
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from mdstopo.case.arrays import Signal, Table, TimeFormula
-from mdstopo.case.model import Prescribed
 from mdstopo.case.geometry.spline import value_and_slope
+from mdstopo.case.model import Prescribed
 from mdstopo.case.scene.load_case_times import Window
 from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.text.words import number_text

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.model import Prescribed, PrescribedRotation
 from mdstopo.case.geometry.start_rotations import unit
+from mdstopo.case.model import Prescribed, PrescribedRotation
 from mdstopo.case.scene.load_case_times import Window
 from mdstopo.case.scene.prescribed import (
     AGREE,

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Triple, VectorSignal
-from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
-from mdstopo.case.keys.signals import UnaddedSignalsError, combined
-from mdstopo.case.model import GROUND, Load, SpatialBody
-from mdstopo.case.objects.plane_or_space import Geometry
 from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.geometry.outlines import build_outlines
 from mdstopo.case.geometry.spatial_outlines import SPATIAL
 from mdstopo.case.geometry.spatial_point_grids import check_grid, grid_count, grid_points
 from mdstopo.case.geometry.start_rotations import about_axis, of_quaternion, orthonormal
-from mdstopo.case.scene.loading import scaled
+from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
+from mdstopo.case.keys.signals import UnaddedSignalsError, combined
+from mdstopo.case.model import GROUND, Load, SpatialBody
+from mdstopo.case.objects.plane_or_space import Geometry
+from mdstopo.case.scene.load_cases import scaled
 from mdstopo.case.scene.prescribed import size_of
 from mdstopo.case.scene.surfaces import surface_contact
 from mdstopo.case.schema.schema_space import SPACE_FORMAT, ZERO

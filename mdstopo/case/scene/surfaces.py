@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.model import GROUND, Surface, SurfaceContact
-from mdstopo.case.objects.frames import Frames
 from mdstopo.case.geometry.coordinates import in_range
 from mdstopo.case.geometry.spatial_point_grids import PERPENDICULAR
 from mdstopo.case.geometry.start_rotations import frame_along, unit
+from mdstopo.case.model import GROUND, Surface, SurfaceContact
+from mdstopo.case.objects.frames import Frames
 from mdstopo.case.schema.schema_surface import SHAPES
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside

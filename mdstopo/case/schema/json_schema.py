@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mdstopo.case.keys.number_rows import FileName
-from mdstopo.case.responses.responses import OF_OTHERS
+from mdstopo.case.responses.response_kinds import OF_OTHERS
 from mdstopo.case.schema.schema_case import FORMAT
 from mdstopo.case.schema.schema_scene import LAW
 from mdstopo.case.schema.schema_space import SPACE_FORMAT

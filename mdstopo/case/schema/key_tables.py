@@ -5,14 +5,14 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from mdstopo.case.geometry.mesh_files import MeshFaces, MeshFile
+from mdstopo.case.geometry.svg_path import SvgPath
 from mdstopo.case.keys.definitions import DefinedName, Definitions
 from mdstopo.case.keys.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.keys.kinds import NUMBER, Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
 from mdstopo.case.keys.number_rows import FILE, FileName, Rows, Signals
 from mdstopo.case.keys.records import ByDepth, ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.laws.expression_law import Parameters
-from mdstopo.case.geometry.mesh_files import MeshFaces, MeshFile
-from mdstopo.case.geometry.svg_path import SvgPath
 from mdstopo.case.schema.schema_case import FORMAT
 from mdstopo.case.schema.schema_fit import ColumnOf
 from mdstopo.case.schema.schema_space import SPACE_FORMAT

@@ -31,7 +31,7 @@ from mdstopo.case.methods.over_time import DEFAULT_REDUCTION
 from mdstopo.case.methods.over_time import names as reductions
 from mdstopo.case.methods.sensitivities import AUTO_SENSITIVITY
 from mdstopo.case.methods.sensitivities import names as sensitivities
-from mdstopo.case.responses.responses import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
+from mdstopo.case.responses.response_kinds import IN_SPACE_ALONE, OF_OTHERS, RESPONSES, response_kinds, unit_stated
 from mdstopo.case.schema.schema_contact import CONTACT
 from mdstopo.case.schema.schema_fit import fit_record
 from mdstopo.case.schema.schema_scene import (

@@ -1,4 +1,4 @@
-"""Format 1 of the case file: contacts of points with edges. See `mdstopo.case.schema.schema_case`."""
+"""Format 1 of the case file: contacts of points with edges. See `schema_case`."""
 
 from __future__ import annotations
 

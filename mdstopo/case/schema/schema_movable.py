@@ -1,4 +1,4 @@
-"""Format 1 of the case file: where points may move that are design variables. See `mdstopo.case.schema.schema_case`."""
+"""Format 1 of the case file: where points may move that are design variables. See `schema_case`."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
-"""Format 1 of the case file: what bodies look like in pictures. See `mdstopo.case.schema.schema_case`."""
+"""Format 1 of the case file: what bodies look like in pictures. See `schema_case`."""
 
 from __future__ import annotations
 
+from mdstopo.case.geometry.mesh_files import MeshFaces
+from mdstopo.case.geometry.svg_path import SvgPath
 from mdstopo.case.keys.common_keys import FRAME, PAIR, TRIPLE
 from mdstopo.case.keys.kinds import POSITIVE, Kind
 from mdstopo.case.keys.number_rows import Rows
 from mdstopo.case.keys.records import ByShape, Key, ListOf, Record, Vector
-from mdstopo.case.geometry.mesh_files import MeshFaces
-from mdstopo.case.geometry.svg_path import SvgPath
 
 _MIDDLE = "the centre of mass"
 _RADIUS = Key("radius", POSITIVE, "radius", required=True, unit="m")

@@ -1,4 +1,4 @@
-"""Format 1 of the case file: bodies, joints, motions, points, members, loads. See `mdstopo.case.schema.schema_case`."""
+"""Format 1 of the case file: bodies, joints, motions, points, members, loads. See `schema_case`."""
 
 from __future__ import annotations
 

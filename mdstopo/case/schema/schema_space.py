@@ -1,9 +1,10 @@
-"""Format 1 of the case file in space: what differs from the plane. See `mdstopo.case.schema.schema_case`."""
+"""Format 1 of the case file in space: what differs from the plane. See `schema_case`."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from mdstopo.case.geometry.mesh_files import MeshFile
 from mdstopo.case.joints.joint import record_of
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
 from mdstopo.case.joints.spatial_keys import POINT
@@ -11,8 +12,7 @@ from mdstopo.case.keys.common_keys import BODY, COUNT, DIRECTION, FRAME, FRAMES,
 from mdstopo.case.keys.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind
 from mdstopo.case.keys.number_rows import Rows, Signals
 from mdstopo.case.keys.records import ByDepth, ByShape, Key, ListOf, Named, Record, Tagged, Vector
-from mdstopo.case.geometry.mesh_files import MeshFile
-from mdstopo.case.responses.responses import response_kinds
+from mdstopo.case.responses.response_kinds import response_kinds
 from mdstopo.case.responses.spatial_responses import IN_PLANE_ALONE, SPATIAL_RESPONSES
 from mdstopo.case.schema.schema_case import CONSTRAINT, FORMAT, LOAD_CASE_KEY, OBJECTIVE
 from mdstopo.case.schema.schema_contact import CONTACT

@@ -1,4 +1,4 @@
-"""Format 1 of the case file in space: surfaces that points of other bodies touch. See `mdstopo.case.schema.schema_case`."""
+"""Format 1 of the case file in space: surfaces that points of other bodies touch. See `schema_case`."""
 
 from __future__ import annotations
 

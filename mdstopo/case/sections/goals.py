@@ -15,7 +15,7 @@ from mdstopo.case.design.volume import check_feasible, prices
 from mdstopo.case.methods.over_time import DEFAULT_REDUCTION
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.responses.responses import response_of
+from mdstopo.case.responses.response_kinds import response_of
 from mdstopo.case.scene.candidates import coefficients_of
 from mdstopo.case.scene.load_case_times import DEFAULT
 from mdstopo.case.schema.schema_case import SENSES

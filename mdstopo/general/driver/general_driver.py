@@ -12,7 +12,7 @@ from mdstopo.case.memory import most_floats, room_factor
 from mdstopo.case.methods.over_time import ReductionKind
 from mdstopo.case.methods.sensitivities import SENSITIVITIES
 from mdstopo.case.model import GROUND, Case, Joint, MemberGroup
-from mdstopo.case.responses.responses import kind_of
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.text.errors import CaseError
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.driver.competing_members import compete, members_peaks

@@ -1,4 +1,4 @@
-"""What becomes of an integral over time: the formulas of the reductions that follow from one (`case.methods.over_time`).
+"""What becomes of an integral over time: formulas of the reductions that follow from one (`case.methods.over_time`).
 
 Each is called with the integral of the response, or of its square, and the simulated time (s). It returns the value and
 its derivative by the integral.
