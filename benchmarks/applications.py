@@ -14,8 +14,8 @@ from benchmarks.scenes import CASES
 from mdstopo import Case, Evaluation, evaluate, load_case, optimize, simulate
 from mdstopo.bench.tables import Table, significant, verdict
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
-from mdstopo.case.parts import MemberGroup
-from mdstopo.case.response_units import words
+from mdstopo.case.objects.parts import MemberGroup
+from mdstopo.case.responses.response_units import words
 from mdstopo.optimizer.scalarisation import Scalarisation
 
 Floats = NDArray[np.float64]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from mdstopo.bench.tables import Table, verdict
-from mdstopo.case.measurements import Measured
 from mdstopo.case.reader import read_case
+from mdstopo.case.sections.measurements import Measured
 from mdstopo.fit.fit_problem import FitProblem
 from mdstopo.fit.least_squares import COST, SLOPE, STEP, Minimum, fitted, minimum
 from mdstopo.fit.statistics import statistics

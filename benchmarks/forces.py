@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from mdstopo import Case, simulate
 from mdstopo.case.model import GROUND, ActuatorLaw, CrushLaw, GapLaw, SpringLaw
-from mdstopo.case.parts import MemberGroup
+from mdstopo.case.objects.parts import MemberGroup
 from mdstopo.integrators.trajectory import Trajectory
 
 Floats = NDArray[np.float64]

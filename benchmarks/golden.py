@@ -25,8 +25,8 @@ from benchmarks.scenes import CASES
 from mdstopo import Case, evaluate, load_case, optimize
 from mdstopo.api import METHODS as SENSITIVITIES
 from mdstopo.bench.tables import Table, verdict
-from mdstopo.case.errors import CaseError
-from mdstopo.case.integrators import INTEGRATORS
+from mdstopo.case.methods.integrators import INTEGRATORS
+from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.store import SETTINGS
 from mdstopo.installed import version_of
 

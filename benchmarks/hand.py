@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo import Case
-from mdstopo.case.parts import MemberGroup
+from mdstopo.case.objects.parts import MemberGroup
 from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
 from mdstopo.optimizer.gsao import Gsao

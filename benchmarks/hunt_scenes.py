@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.over_time import REDUCTIONS
+from mdstopo.case.methods.over_time import REDUCTIONS
 
 #: laws that some parameter of can vary, and which
 VARIED = {

@@ -8,8 +8,8 @@ import numpy as np
 from benchmarks.scenes import CASES
 from mdstopo import Evaluation, evaluate, load_case
 from mdstopo.bench.tables import Table, verdict
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.finalize.lift_case import lifted
 
 FOLDERS = (CASES, Path(__file__).resolve().parent.parent / "tests" / "general" / "cases")

@@ -34,8 +34,9 @@ def _with_libm_powers() -> None:
 def _with_numba_counting() -> None:
     from mdstopo.compiler.kernel import way
 
-    private: Any = way()
-    del private._LEANER[private.NativeLowering]
+    way()
+    passes: Any = importlib.import_module("mdstopo.compiler.numba_private.function_passes")
+    del passes.LEANER[passes.NativeLowering]
 
 
 #: by part: the case, its integrator, what is timed, and how the part is left out

@@ -17,8 +17,8 @@ import numpy as np
 
 from mdstopo import Case
 from mdstopo.bench.tables import Table
-from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
+from mdstopo.case.scene.candidates import with_members
 from mdstopo.engine import Evaluator
 from mdstopo.plan.pricing import price
 from mdstopo.session.outcome import Outcome

@@ -20,8 +20,8 @@ if str(ROOT) not in sys.path:  # mkdocs loads this file alone
     sys.path.insert(0, str(ROOT))
 
 from documentation import array_tables, command_pages, maths  # noqa: E402
-from mdstopo.case import key_tables  # noqa: E402
-from mdstopo.case.schema_case import json_schema  # noqa: E402
+from mdstopo.case.schema import key_tables  # noqa: E402
+from mdstopo.case.schema.json_schema import json_schema  # noqa: E402
 
 _MARK = re.compile(r"^<!-- (keys|keys in space|arrays|commands|exit statuses)(?:: (\w+))? -->$", re.MULTILINE)
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mdstopo.case.errors import CaseError
+from mdstopo.case.methods.sensitivities import AUTO_SENSITIVITY, names
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case
-from mdstopo.case.sensitivities import AUTO_SENSITIVITY, names
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import ErrorEstimate, Evaluation, FloatArray, Peak
 from mdstopo.evaluators import evaluator_of

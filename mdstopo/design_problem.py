@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from mdstopo.case.design_space import DesignSpace
-from mdstopo.case.errors import CaseError
-from mdstopo.case.exchange import Side, exchange_ends
+from mdstopo.case.design.exchange import Side, exchange_ends
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow, VolumeRow
-from mdstopo.case.over_time import REDUCTIONS
-from mdstopo.case.responses import kind_of
+from mdstopo.case.objects.design_space import DesignSpace
+from mdstopo.case.responses.response_kinds import kind_of
+from mdstopo.case.text.errors import CaseError
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation

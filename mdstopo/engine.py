@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from mdstopo.case.candidates import mirrored_groups
-from mdstopo.case.errors import CaseError
-from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, SMOOTH, STIFF
-from mdstopo.case.integrators import having as integrators_having
+from mdstopo.case.methods.integrators import ADAPTIVE, AUTO, INTEGRATORS, SMOOTH, STIFF
+from mdstopo.case.methods.integrators import having as integrators_having
+from mdstopo.case.methods.sensitivities import SENSITIVITIES, chosen
+from mdstopo.case.methods.sensitivities import having as methods_having
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
-from mdstopo.case.sensitivities import SENSITIVITIES, chosen
-from mdstopo.case.sensitivities import having as methods_having
+from mdstopo.case.scene.candidates import mirrored_groups
+from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.integrator_choice import choose, method_of

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mdstopo.case.integrators import INTEGRATORS
+from mdstopo.case.methods.integrators import INTEGRATORS
 from mdstopo.case.model import Case
 from mdstopo.evaluation import ErrorEstimate, Evaluation, FloatArray
 from mdstopo.integrators.scene_driver import Scene, SceneDriver

@@ -11,9 +11,9 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
+from mdstopo.case.methods.sensitivities import SENSITIVITIES
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
-from mdstopo.case.sensitivities import SENSITIVITIES
 from mdstopo.children import command
 from mdstopo.compiler.store import are_kept, cache_folder, is_kept
 from mdstopo.scene.family import beyond_springs

@@ -31,7 +31,7 @@ import numpy as np
 from llvmlite.binding import get_host_cpu_features
 
 import mdstopo
-from mdstopo.case.integrators import INTEGRATORS
+from mdstopo.case.methods.integrators import INTEGRATORS
 from mdstopo.case.model import SolverSettings
 from mdstopo.compiler import store
 from mdstopo.compiler.entry import DTYPES, Entry, types_of

@@ -15,8 +15,8 @@ import venv
 from pathlib import Path
 
 from mdstopo import load_case
-from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.case.shipped import names
+from mdstopo.case.methods.integrators import INTEGRATORS
+from mdstopo.case.text.shipped import names
 from mdstopo.cli.new import templates
 from mdstopo.compiler.store import PROCESSORS
 

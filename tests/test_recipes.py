@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from mdstopo import __version__, load_case
-from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.case.shipped import names
+from mdstopo.case.methods.integrators import INTEGRATORS
+from mdstopo.case.text.shipped import names
 from mdstopo.cli.new import templates
 from mdstopo.compiler import store
 from mdstopo.compiler.entry import Entry, types_of

@@ -7,8 +7,8 @@ from benchmarks.peers.picture import draw
 from benchmarks.peers.sections import Group, case_groups, compared, paper_groups
 from benchmarks.peers.translate import NotForPeersError
 from mdstopo.bench.tables import Table
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.text.errors import CaseError
 
 
 def comparison(case: Case | None, tell: Callable[[str], None], picture: Path | None) -> Iterator[Table]:

@@ -15,11 +15,11 @@ from mdstopo.bench.reference import Floats, Reference, solution
 from mdstopo.bench.scenes import plate
 from mdstopo.bench.tables import Table, significant
 from mdstopo.bench.timing import interleaved
-from mdstopo.case.errors import CaseError
-from mdstopo.case.integrators import INTEGRATORS
+from mdstopo.case.methods.integrators import INTEGRATORS
+from mdstopo.case.methods.sensitivities import SENSITIVITIES
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
-from mdstopo.case.sensitivities import SENSITIVITIES
+from mdstopo.case.text.errors import CaseError
 from mdstopo.plots.style import COLOURS, MARKERS, new_figure, save, styled
 from mdstopo.scene.family import beyond_springs, collocates
 

@@ -12,18 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mdstopo.case.aims import (
-    Combine,
-    Following,
-    Follows,
-    Objective,
-    OptimizerSettings,
-    Response,
-    ResponseRow,
-    SolverSettings,
-    Variable,
-    VolumeRow,
-)
 from mdstopo.case.arrays import (
     Components,
     FloatArray,
@@ -36,9 +24,7 @@ from mdstopo.case.arrays import (
     VectorSignal,
     read_only,
 )
-from mdstopo.case.design_space import DesignSpace, slots_of
-from mdstopo.case.errors import Mistake
-from mdstopo.case.fitting import Fit
+from mdstopo.case.geometry.rigid_bodies import AnyBody, Body, SpatialBody
 from mdstopo.case.joints import JOINTS, DistanceJoint, FixedJoint, Joint, PrismaticJoint, RevoluteJoint
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.laws import (
@@ -54,11 +40,22 @@ from mdstopo.case.laws import (
     SpringLaw,
     TableLaw,
 )
-from mdstopo.case.marks import Marks
-from mdstopo.case.parts import (
-    AnyBody,
+from mdstopo.case.objects.aims import (
+    Combine,
+    Following,
+    Follows,
+    Objective,
+    OptimizerSettings,
+    Response,
+    ResponseRow,
+    SolverSettings,
+    Variable,
+    VolumeRow,
+)
+from mdstopo.case.objects.design_space import DesignSpace, slots_of
+from mdstopo.case.objects.fitting import Fit
+from mdstopo.case.objects.parts import (
     AnyContact,
-    Body,
     Bushing,
     Candidates,
     Contact,
@@ -70,13 +67,14 @@ from mdstopo.case.parts import (
     PointGrid,
     Prescribed,
     PrescribedRotation,
-    SpatialBody,
     Surface,
     SurfaceContact,
 )
-from mdstopo.case.uncertain import Uncertainty
+from mdstopo.case.objects.uncertain import Uncertainty
+from mdstopo.case.text.errors import Mistake
+from mdstopo.case.text.marks import Marks
+from mdstopo.case.text.words import GROUND
 from mdstopo.case.value import Value, frozen
-from mdstopo.case.words import GROUND
 from mdstopo.shown import counted, html_of
 
 __all__ = [

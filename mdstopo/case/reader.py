@@ -12,29 +12,32 @@ from pathlib import Path
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.candidates import with_start_set
-from mdstopo.case.contacts import build_contacts
-from mdstopo.case.definitions import MARK, SECTION, beginning, with_numbers
-from mdstopo.case.design_variables import build_shared, build_variables
-from mdstopo.case.errors import CaseError, Mistake
-from mdstopo.case.extending import KEY, CannotExtendError, extended, text_of_tree
-from mdstopo.case.file_text import FileTextError, text_in
-from mdstopo.case.fitting import Fit
-from mdstopo.case.geometry import Geometry, geometry_in
-from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
-from mdstopo.case.groups import build_groups
-from mdstopo.case.links import build_bushings, build_joints, declare_joints
-from mdstopo.case.loading import build_load_cases, windows
+from mdstopo.case.design.design_variables import build_shared, build_variables
+from mdstopo.case.design.movable import build_movable
+from mdstopo.case.keys.definitions import MARK, SECTION, beginning, with_numbers
 from mdstopo.case.model import GROUND, Case
-from mdstopo.case.motions import build_motions, merged, resolve_starts, start_angle
-from mdstopo.case.movable import build_movable
-from mdstopo.case.nodes import MAPPING, Node, YamlSyntaxError, parse
-from mdstopo.case.overrides import apply_overrides
-from mdstopo.case.reading import BAD, Fields, Reading, found
-from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
-from mdstopo.case.shipped import case_file, names
-from mdstopo.case.start_geometry import Frames, build_points
-from mdstopo.case.words import inside
+from mdstopo.case.objects.fitting import Fit
+from mdstopo.case.objects.frames import Frames
+from mdstopo.case.objects.plane_or_space import Geometry
+from mdstopo.case.scene.candidates import with_start_set
+from mdstopo.case.scene.contacts import build_contacts
+from mdstopo.case.scene.dimensions import geometry_in
+from mdstopo.case.scene.groups import build_groups
+from mdstopo.case.scene.links import build_bushings, build_joints, declare_joints
+from mdstopo.case.scene.load_case_times import windows
+from mdstopo.case.scene.load_cases import build_load_cases
+from mdstopo.case.scene.motions import build_motions, merged, resolve_starts, start_angle
+from mdstopo.case.scene.points import build_points
+from mdstopo.case.sections.goals import apply_design, build_combine, build_constraints, build_objectives
+from mdstopo.case.sections.settings import build_optimizer, build_solver, warn_assemble
+from mdstopo.case.text.errors import CaseError, Mistake
+from mdstopo.case.text.extending import KEY, CannotExtendError, extended, text_of_tree
+from mdstopo.case.text.file_text import FileTextError, text_in
+from mdstopo.case.text.nodes import MAPPING, Node, YamlSyntaxError, parse
+from mdstopo.case.text.overrides import apply_overrides
+from mdstopo.case.text.reading import BAD, Fields, Reading, found
+from mdstopo.case.text.shipped import case_file, names
+from mdstopo.case.text.words import inside
 
 _SECTIONS = {
     "body": "bodies",
@@ -140,7 +143,7 @@ class Document:
         assert isinstance(top, Fields)
         parts = _build(top, root, self._written, geometry, reading)
         if top["uncertainty"] is not None:
-            from mdstopo.case.uncertainty import build_uncertainty  # most cases have none
+            from mdstopo.case.sections.uncertainty_section import build_uncertainty  # most cases have none
 
             parts["uncertainty"] = build_uncertainty(top, parts["constraints"], root, reading)
         if reading.mistakes:
@@ -232,7 +235,7 @@ def _build(top: Fields, root: Node, written: Node, geometry: Geometry, reading: 
 def _fit(top: Fields, root: Node, frames: Frames, reading: Reading) -> Fit | None:
     if top["fit"] is None:
         return None
-    from mdstopo.case.fit_section import build_fit  # most cases have none
+    from mdstopo.case.sections.fit_section import build_fit  # most cases have none
 
     return build_fit(top, root, frames, reading)
 

@@ -51,7 +51,7 @@ def command(case_path: Path, result_file: Path | None, overrides: dict[str, str]
 
 def say_bounds(output: Output, case: "Case", found: "Mapping[str, Compared]") -> None:
     """A line for each bound, with the best and the gap where they are known, and a sentence on what it is over."""
-    from mdstopo.case.response_units import unit_of_value
+    from mdstopo.case.responses.response_units import unit_of_value
 
     units = {each.name: unit_of_value(each) for each in case.objectives}
     side = {each.name: "at most" if each.sense == "maximize" else "at least" for each in case.objectives}
@@ -80,7 +80,7 @@ def document(each: "Compared") -> dict[str, Any]:
 
 def result_bounds(view: "ResultView") -> "tuple[Case, dict[str, Compared]] | None":
     """The case of a result of run or pareto, and its bounds beside its best; None where there is no bound to tell."""
-    from mdstopo.case.errors import CaseError
+    from mdstopo.case.text.errors import CaseError
     from mdstopo.limiting.compare import compared
     from mdstopo.store.stored_case import case_of
 

@@ -5,15 +5,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdstopo.case.words import count_text
+from mdstopo.case.text.words import count_text
 from mdstopo.cli.options import announce_compilation, case_argument, output_options, set_option
 from mdstopo.cli.output import Output, number
 from mdstopo.cli.uncertain_numbers import say_sample
 from mdstopo.shown import counted
 
 if TYPE_CHECKING:
-    from mdstopo.case.errors import CaseError
     from mdstopo.case.model import Case
+    from mdstopo.case.text.errors import CaseError
     from mdstopo.engine import Evaluator
 
 _SOFT_BRANCH = (
@@ -32,7 +32,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     Nothing is optimised; one evaluation tells what each costs. What cannot be computed yet is listed with its place
     (exit status 2).
     """
-    from mdstopo.case.errors import CaseError
+    from mdstopo.case.text.errors import CaseError
     from mdstopo.scene.refusals import refusals
 
     output = Output(json=as_json, quiet=quiet)
@@ -51,8 +51,8 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
 
 def _read(output: Output, case_path: Path, overrides: dict[str, str]) -> "Case":
     """The case; its mistakes are printed where it has some (CaseError)."""
-    from mdstopo.case.errors import CaseError
     from mdstopo.case.reader import load_case
+    from mdstopo.case.text.errors import CaseError
 
     try:
         return load_case(case_path, overrides)
@@ -262,7 +262,7 @@ def _say_members(output: Output, case: "Case") -> None:
 
 def _say_stages(output: Output, case: "Case") -> list[dict[str, float]]:
     """The powers of each stage that a run goes through, by group; nothing where there is one."""
-    from mdstopo.case.stages import stage_case, stage_count
+    from mdstopo.case.design.stages import stage_case, stage_count
 
     count = stage_count(case)
     if count == 1:
@@ -306,7 +306,7 @@ def _say_fit(output: Output, case: "Case") -> None:
     """What `mdstopo fit` estimates, and of which measurements."""
     if case.fit is None:
         return
-    from mdstopo.case.response_units import words
+    from mdstopo.case.responses.response_units import words
 
     output.say(f"{len(case.fit.numbers)} numbers to fit")
     rows = [["number", "initial", "lower", "upper"]]
@@ -346,7 +346,7 @@ def _alike(found: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str]]
 
 def _say_frequencies(output: Output, case: "Case", found: list[dict[str, Any]]) -> None:
     # on which side of the criterion a case stands is a question of stored energy alone
-    from mdstopo.case.responses import kind_of
+    from mdstopo.case.responses.response_kinds import kind_of
 
     energetic = {objective.load_case for objective in case.objectives if kind_of(objective.response).is_energy}
     for entry, names in _alike(found):

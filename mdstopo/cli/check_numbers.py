@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.arrays import Signal, TimeFormula
-from mdstopo.case.columns import point_columns
 from mdstopo.case.model import GROUND, Case, Contact, SpringLaw, SurfaceContact, Table, VolumeRow
-from mdstopo.case.response_units import BOUNDED
+from mdstopo.case.responses.columns import point_columns
+from mdstopo.case.responses.response_units import BOUNDED
 from mdstopo.cli.output import number
 from mdstopo.scene.bodies import placed
 

@@ -50,6 +50,6 @@ class CaseFile(FileOf):
         found = super().shell_complete(ctx, param, incomplete)
         if not incomplete or "/" in incomplete:
             return found
-        from mdstopo.case.shipped import names
+        from mdstopo.case.text.shipped import names
 
         return found + [CompletionItem(name) for name in names() if name.startswith(incomplete)]

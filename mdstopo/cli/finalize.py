@@ -171,7 +171,7 @@ def _range(values: list[float]) -> str:
 
 def _constraint(case: "Case", i: int) -> str:
     """A constraint and its bound in words."""
-    from mdstopo.case.response_units import constrained
+    from mdstopo.case.responses.response_units import constrained
 
     row = case.constraints[i]
     return f"{constrained(case, row)} {_SIGNS[row.sense]} {number(row.bound, 9)}"

@@ -83,7 +83,7 @@ def command(
     output = Output(json=as_json, quiet=quiet)
     case = open_case(case_path, overrides)
     if case.fit is None:
-        from mdstopo.case.errors import CaseError
+        from mdstopo.case.text.errors import CaseError
 
         needed = "the key 'fit' is missing: it says what is estimated and what was measured"
         raise CaseError([case.marks.mistake("", needed)], str(case_path))
@@ -255,7 +255,7 @@ def _remarks(run: "FitRun") -> list[str]:
     if run.statistics is None:
         return []
     told = []
-    from mdstopo.case.losses import LOSSES
+    from mdstopo.case.methods.losses import LOSSES
     from mdstopo.fit.least_squares import stated_deviations
 
     known = not math.isnan(float(stated_deviations(run.problem).max()))

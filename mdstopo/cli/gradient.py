@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdstopo.case.sensitivities import DEFAULT_SENSITIVITY, SENSITIVITIES, having
+from mdstopo.case.methods.sensitivities import DEFAULT_SENSITIVITY, SENSITIVITIES, having
 from mdstopo.cli.options import (
     alpha_option,
     announce_compilation,
@@ -144,10 +144,10 @@ def command(
 
 def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str, ...], history: bool) -> "Case":
     """The case as the methods need it; raises CaseError where they cannot be applied."""
-    from mdstopo.case.errors import CaseError
-    from mdstopo.case.integrators import AUTO
-    from mdstopo.case.integrators import having as integrators_having
-    from mdstopo.case.words import listed
+    from mdstopo.case.methods.integrators import AUTO
+    from mdstopo.case.methods.integrators import having as integrators_having
+    from mdstopo.case.text.errors import CaseError
+    from mdstopo.case.text.words import listed
     from mdstopo.scene.refusals import no_derivatives
 
     refused = [method for method in methods if not SENSITIVITIES[method].by_parameters]
@@ -222,7 +222,7 @@ def _difference(
     """Add differences of some members to the results; why there are none, where there are none."""
     import numpy as np
 
-    from mdstopo.case.integrators import AUTO, INTEGRATORS
+    from mdstopo.case.methods.integrators import AUTO, INTEGRATORS
     from mdstopo.cli.gradient_numbers import chosen_members, differences, ranges, value_differences
     from mdstopo.evaluators import evaluator_of
 

@@ -100,6 +100,6 @@ def _explain(error: Exception) -> tuple[str | None, int]:
         return str(error), status
     if isinstance(error, MemoryError):
         return f"there is not enough memory: {error}" if str(error) else "there is not enough memory", 1
-    from mdstopo.case.errors import CaseError
+    from mdstopo.case.text.errors import CaseError
 
     return (str(error), 2) if isinstance(error, CaseError) else (None, 1)

@@ -34,7 +34,7 @@ def command(source: Path, body: str, unit: str | None, fix: bool, out: Path | No
     out: where the text goes; None prints it.
     quiet: say nothing but mistakes.
     """
-    from mdstopo.case.yaml_text import text_of
+    from mdstopo.case.text.yaml_text import text_of
     from mdstopo.cli.import_points import ImportedError
     from mdstopo.store.store_errors import StoreError
 
@@ -68,7 +68,7 @@ def command(source: Path, body: str, unit: str | None, fix: bool, out: Path | No
 
 def _points(source: Path, data: str, body: str, unit: str | None) -> tuple[dict[str, Any], list[str]]:
     """The `points` of a case, in metres, and what is said of their unit."""
-    from mdstopo.case.quantities import QuantityError, in_si
+    from mdstopo.case.text.quantities import QuantityError, in_si
     from mdstopo.cli.import_points import points_in
     from mdstopo.cli.import_robots import as_name
 

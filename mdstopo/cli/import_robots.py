@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.start_rotations import about_axis
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.cli.import_points import ImportedError
 
 Floats = NDArray[np.float64]

@@ -90,8 +90,8 @@ def open_case(path: Path, overrides: dict[str, str], alpha_path: Path | None = N
 
     alpha_path: of a design; where that is a result and candidates are priced, they are members that are there.
     """
-    from mdstopo.case.errors import CaseError
     from mdstopo.case.reader import load_case
+    from mdstopo.case.text.errors import CaseError
     from mdstopo.scene.refusals import refusals
 
     case = load_case(path, overrides)

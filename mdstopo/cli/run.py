@@ -225,8 +225,8 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     import numpy as np
 
     from mdstopo.case.model import VolumeRow
-    from mdstopo.case.response_units import bounded, constrained
-    from mdstopo.case.words import count_text
+    from mdstopo.case.responses.response_units import bounded, constrained
+    from mdstopo.case.text.words import count_text
     from mdstopo.cli.show import values_text
     from mdstopo.scene.moving_volumes import spent
     from mdstopo.session.sizes import at_prices
@@ -264,7 +264,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
 
 def _sizes(chosen: "ChosenSizes") -> list[tuple[str, str]]:
     """What has been chosen from a catalogue, and what is known of it."""
-    from mdstopo.case.words import count_text
+    from mdstopo.case.text.words import count_text
 
     lines = [
         (f"sizes of {name}", ", ".join(f"{count} of {number(size)}" for size, count in sizes.items()))

@@ -20,8 +20,8 @@ def command(section: str | None, space: bool, out: Path | None) -> int:
     typed. With SECTION, a key of the case such as objectives, its keys are
     listed in words; `case` lists the sections.
     """
-    from mdstopo.case.distributions import BroughtError
-    from mdstopo.case.schema_case import ask_distributions, json_schema
+    from mdstopo.case.keys.brought_records import BroughtError
+    from mdstopo.case.schema.json_schema import ask_distributions, json_schema
 
     try:
         ask_distributions()
@@ -44,9 +44,9 @@ def command(section: str | None, space: bool, out: Path | None) -> int:
 
 def _keys(section: str, space: bool) -> str:
     """The keys of a section of a case, a line or more for each."""
-    from mdstopo.case.key_tables import lines_of, places
-    from mdstopo.case.schema_case import FORMAT
-    from mdstopo.case.schema_space import SPACE_FORMAT
+    from mdstopo.case.schema.key_tables import lines_of, places
+    from mdstopo.case.schema.schema_case import FORMAT
+    from mdstopo.case.schema.schema_space import SPACE_FORMAT
 
     case = SPACE_FORMAT if space else FORMAT
     known = {name or "case": name for name, part in places(case).items() if part}

@@ -69,7 +69,7 @@ def say_sample(output: Output, case: "Case") -> dict[str, Any] | None:
     """What the sample of a case is; the same for machines."""
     if case.uncertainty is None:
         return None
-    from mdstopo.case.response_units import constrained
+    from mdstopo.case.responses.response_units import constrained
     from mdstopo.robust.sample import design_sample
 
     uncertain, sample = case.uncertainty, design_sample(case.uncertainty)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from mdstopo.case.response_units import BOUNDED, bounded, constrained, unit_of_bound, unit_of_value, words
+from mdstopo.case.responses.response_units import BOUNDED, bounded, constrained, unit_of_bound, unit_of_value, words
 from mdstopo.cli.output import number
 
 if TYPE_CHECKING:

@@ -15,18 +15,19 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.definitions import SECTION, with_numbers
-from mdstopo.case.mesh_files import is_mesh
+from mdstopo.case.geometry.mesh_files import is_mesh
+from mdstopo.case.keys.definitions import SECTION, with_numbers
+from mdstopo.case.keys.number_rows import rows_in
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
-from mdstopo.case.number_rows import rows_in
-from mdstopo.case.over_time import REDUCTIONS
-from mdstopo.case.overrides import apply_overrides
+from mdstopo.case.objects.frames import Frames
 from mdstopo.case.reader import measured
-from mdstopo.case.reading import Reading
-from mdstopo.case.response_units import constrained
-from mdstopo.case.start_geometry import Frames, frames_of
-from mdstopo.case.words import inside
+from mdstopo.case.responses.response_units import constrained
+from mdstopo.case.scene.dimensions import frames_of
+from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
+from mdstopo.case.text.overrides import apply_overrides
+from mdstopo.case.text.reading import Reading
+from mdstopo.case.text.words import inside
 from mdstopo.finalize.apart import free_name
 from mdstopo.finalize.names import following_law, kept_expressions
 from mdstopo.finalize.scaled_laws import sized as sized_law

@@ -13,7 +13,7 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Case
-from mdstopo.case.words import number_text, shown
+from mdstopo.case.text.words import number_text, shown
 from mdstopo.engine import Evaluator
 from mdstopo.general.at_rest.settle import settle
 from mdstopo.general.driver.general_driver import GeneralDriver

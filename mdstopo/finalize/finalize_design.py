@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.errors import CaseError
+from mdstopo.case.design.movable import with_points_fixed
 from mdstopo.case.model import Case
-from mdstopo.case.movable import with_points_fixed
 from mdstopo.case.reader import read_case
-from mdstopo.case.yaml_text import text_of
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.yaml_text import text_of
 from mdstopo.evaluators import make_engine
 from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content

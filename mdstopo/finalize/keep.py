@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.design_space import slots_of
-from mdstopo.case.design_variables import prices
-from mdstopo.case.errors import CaseError, Mistake
+from mdstopo.case.design.volume import ROUNDING, prices
 from mdstopo.case.model import Case, Variable, VolumeRow
-from mdstopo.case.volume import ROUNDING
-from mdstopo.case.words import count_text, number_text, shown
+from mdstopo.case.objects.design_space import slots_of
+from mdstopo.case.text.errors import CaseError, Mistake
+from mdstopo.case.text.words import count_text, number_text, shown
 from mdstopo.finalize.apart import part, with_own
 
 

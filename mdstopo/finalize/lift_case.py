@@ -13,19 +13,19 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula
-from mdstopo.case.errors import CaseError
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
+from mdstopo.case.keys.number_rows import Signals
+from mdstopo.case.keys.signals import UnaddedSignalsError, combined
+from mdstopo.case.methods.over_time import DEFAULT_REDUCTION, REDUCTIONS
 from mdstopo.case.model import GROUND, Case
-from mdstopo.case.number_rows import Signals
-from mdstopo.case.over_time import DEFAULT_REDUCTION, REDUCTIONS
-from mdstopo.case.overrides import node_of, steps_of
-from mdstopo.case.reading import Reading
-from mdstopo.case.responses import RESPONSES
-from mdstopo.case.signals import UnaddedSignalsError, combined
-from mdstopo.case.start_rotations import about_axis
-from mdstopo.case.words import inside, shown
-from mdstopo.case.yaml_text import text_of
+from mdstopo.case.responses.response_kinds import RESPONSES
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.overrides import node_of, steps_of
+from mdstopo.case.text.reading import Reading
+from mdstopo.case.text.words import inside, shown
+from mdstopo.case.text.yaml_text import text_of
 from mdstopo.finalize.document import Plain, content_of
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.definitions import MARK, SECTION
+from mdstopo.case.design.named_variables import what_follows
+from mdstopo.case.keys.definitions import MARK, SECTION
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Case, Law, VolumeRow
-from mdstopo.case.named_variables import what_follows
-from mdstopo.case.nodes import Node
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.nodes import Node
 
 Plain = dict[str, Any]
 

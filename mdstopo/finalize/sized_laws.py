@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.design.volume import ROUNDING
 from mdstopo.case.model import Case, Law, MemberGroup, VolumeRow
-from mdstopo.case.volume import ROUNDING
 
 #: place of the law in its group -> parameter -> value
 Given = Mapping[int, Mapping[str, float]]

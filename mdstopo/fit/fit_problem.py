@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.fitting import Estimate
-from mdstopo.case.measurements import Measured, read_measured
 from mdstopo.case.model import Case
+from mdstopo.case.objects.fitting import Estimate
+from mdstopo.case.sections.measurements import Measured, read_measured
 from mdstopo.fit.numbers import EXACT, Numbers
 from mdstopo.fit.predictions import Predictions
 

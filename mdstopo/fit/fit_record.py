@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.losses import DEFAULT_LOSS
+from mdstopo.case.methods.losses import DEFAULT_LOSS
 from mdstopo.case.model import Case
-from mdstopo.case.response_units import unit_of, words
+from mdstopo.case.responses.response_units import unit_of, words
 from mdstopo.engine import Evaluator
 from mdstopo.fit.fit_problem import FitProblem
 from mdstopo.fit.prepared import case_at

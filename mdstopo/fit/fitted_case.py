@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from mdstopo.case.errors import CaseError
-from mdstopo.case.extending import lead, text_of_tree
-from mdstopo.case.key_paths import led_to
 from mdstopo.case.model import Case
-from mdstopo.case.nodes import Node, parse
-from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.extending import lead, text_of_tree
+from mdstopo.case.text.key_paths import led_to
+from mdstopo.case.text.nodes import Node, parse
+from mdstopo.case.text.overrides import apply_overrides
 
 _QUOTED = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'(?:[^']|'')*'", re.DOTALL)
 

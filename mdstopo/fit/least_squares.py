@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.losses import LOSSES
+from mdstopo.case.methods.losses import LOSSES
 from mdstopo.fit.fit_problem import FitProblem
 from mdstopo.fit.loss_functions import for_scipy, loss
 from mdstopo.fit.predictions import MotionError

@@ -11,7 +11,7 @@ from pkgutil import resolve_name
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.losses import LOSSES
+from mdstopo.case.methods.losses import LOSSES
 
 Loss = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 
@@ -41,7 +41,7 @@ def cauchy(r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def loss(name: str, r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """rho, psi and psi' (n,) of residuals r (n,), by a loss of `case.losses`."""
+    """rho, psi and psi' (n,) of residuals r (n,), by a loss of `case.methods.losses`."""
     function: Loss = resolve_name(LOSSES[name].function)
     rho, weight, slope = function(r)
     return rho, weight * r, slope

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.design_variables import varying as may_vary
-from mdstopo.case.errors import CaseError
-from mdstopo.case.fitting import FitNumber
+from mdstopo.case.design.design_variables import varying as may_vary
+from mdstopo.case.design.named_variables import laws_that_follow
 from mdstopo.case.model import Case
-from mdstopo.case.named_variables import laws_that_follow
+from mdstopo.case.objects.fitting import FitNumber
 from mdstopo.case.reader import Document
-from mdstopo.case.words import inside
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.words import inside
 from mdstopo.engine import Evaluator
 from mdstopo.fit.prepared import LawPlace, case_at, varying
 from mdstopo.general.driver.observed import BALANCE

@@ -9,9 +9,9 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.errors import CaseError
-from mdstopo.case.measurements import Measured
 from mdstopo.case.model import Case
+from mdstopo.case.sections.measurements import Measured
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.fit.numbers import DIFFERENCES, SHIFT_OF_MOTIONS, Numbers
 from mdstopo.general.driver.general_driver import GeneralDriver

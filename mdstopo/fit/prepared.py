@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from mdstopo.case.errors import CaseError, Mistake
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup, Objective, Variable
-from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.case.reader import read_case
-from mdstopo.case.words import inside
+from mdstopo.case.text.errors import CaseError, Mistake
+from mdstopo.case.text.words import inside
 from mdstopo.scene.springs_model import FloatArray
 
 #: a parameter of a law: group, place of the law, parameter

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.losses import LOSSES
+from mdstopo.case.methods.losses import LOSSES
 from mdstopo.fit.fit_problem import FitProblem
 from mdstopo.fit.least_squares import Minimum, stated_deviations
 from mdstopo.fit.loss_functions import loss

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case, FloatArray
+from mdstopo.case.text.errors import CaseError
 from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.state import State
 from mdstopo.plan.priced_designs import packed

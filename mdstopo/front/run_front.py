@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import cores
 from mdstopo.design_problem import sign_of
 from mdstopo.evaluators import make_engine

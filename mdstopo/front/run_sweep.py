@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mdstopo.case.candidates import pairs_of
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case
+from mdstopo.case.scene.candidates import pairs_of
+from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import cores
 from mdstopo.front.cluster import Cluster
 from mdstopo.front.directions import MOST, parse_range

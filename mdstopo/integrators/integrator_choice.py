@@ -4,9 +4,9 @@ from pkgutil import resolve_name
 
 import numpy as np
 
-from mdstopo.case.integrators import ADAPTIVE, AUTO, FIXED, INTEGRATORS, SMOOTH, having
+from mdstopo.case.methods.integrators import ADAPTIVE, AUTO, FIXED, INTEGRATORS, SMOOTH, having
+from mdstopo.case.methods.sensitivities import chosen
 from mdstopo.case.model import SolverSettings
-from mdstopo.case.sensitivities import chosen
 from mdstopo.integrators.scene_driver import Method
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-from mdstopo.case.integrators import IntegratorKind
+from mdstopo.case.methods.integrators import IntegratorKind
 from mdstopo.case.model import LoadCase, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.scene.settled import Settled

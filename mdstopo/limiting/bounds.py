@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mdstopo.case.aims import Objective
 from mdstopo.case.model import Case
-from mdstopo.case.response_units import unit_of_value, words
-from mdstopo.case.responses import kind_of
+from mdstopo.case.objects.aims import Objective
+from mdstopo.case.responses.response_kinds import kind_of
+from mdstopo.case.responses.response_units import unit_of_value, words
 from mdstopo.limiting.force_limits import restrictions
 from mdstopo.limiting.program import ImpossibleError, Program
 from mdstopo.limiting.response import Limits, NoBoundError, limits_of, objective_row

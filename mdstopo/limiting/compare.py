@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.design.stages import stage_count
 from mdstopo.case.model import Case
-from mdstopo.case.stages import stage_count
 from mdstopo.limiting.bounds import Bound, bounds
 from mdstopo.store.store_errors import StoreError
 from mdstopo.store.whole_front import whole_front

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mdstopo.case.aims import Objective, Response, ResponseRow
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import GROUND
-from mdstopo.case.over_time import REDUCTIONS
-from mdstopo.case.response_units import words
-from mdstopo.case.responses import kind_of
+from mdstopo.case.objects.aims import Objective, Response, ResponseRow
+from mdstopo.case.responses.response_kinds import kind_of
+from mdstopo.case.responses.response_units import words
 from mdstopo.limiting.known import Cubics, Floats
 from mdstopo.limiting.system import System
 

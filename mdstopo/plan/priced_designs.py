@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.candidates import Pairs, with_members
 from mdstopo.case.model import Case, MemberGroup
+from mdstopo.case.scene.candidates import Pairs, with_members
 
 Floats = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.candidates import Pairs, mirrored_groups, with_members
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
+from mdstopo.case.scene.candidates import Pairs, mirrored_groups, with_members
 from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.competing_rows import FeasibleSet, multipliers

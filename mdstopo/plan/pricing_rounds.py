@@ -7,9 +7,9 @@ leave only where a round has lowered the objective: no set of members comes twic
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.candidates import Pairs, pairs_of, with_members
 from mdstopo.case.model import Case
-from mdstopo.case.words import count_text
+from mdstopo.case.scene.candidates import Pairs, pairs_of, with_members
+from mdstopo.case.text.words import count_text
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.state import State
 from mdstopo.plan.pricing import Prices, Pricing, confirmed, price

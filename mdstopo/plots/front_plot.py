@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.response_units import unit_of_value
+from mdstopo.case.responses.response_units import unit_of_value
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import WIDTH, colour, ink
 from mdstopo.store.store_errors import StoreError

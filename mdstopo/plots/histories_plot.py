@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.response_units import unit_of, words
+from mdstopo.case.responses.response_units import unit_of, words
 from mdstopo.plots.objectives_over_time import response_history
 from mdstopo.plots.source import SAMPLES, Floats, Source
 from mdstopo.plots.style import DASHES, colour, new_figure

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdstopo.case.arrays import Table, TimeFormula
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, Prescribed, PrescribedRotation
-from mdstopo.case.prescribed import size_of
+from mdstopo.case.scene.prescribed import size_of
 from mdstopo.plots.scenery import Floats
 from mdstopo.scene.point_positions import points_at
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.model import Case
-from mdstopo.case.words import inside
+from mdstopo.case.text.words import inside
 from mdstopo.finalize.document import content_of
 from mdstopo.plots.scenery import Floats
 from mdstopo.plots.source import Source

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case
-from mdstopo.case.response_units import unit_of, unit_of_value, words
+from mdstopo.case.responses.response_units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared, kept_iterates
 from mdstopo.plots.body_shapes import planar_shapes

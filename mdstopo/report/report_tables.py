@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.design.stages import stage_count
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case
-from mdstopo.case.over_time import REDUCTIONS
-from mdstopo.case.response_units import constrained, unit_of_bound, unit_of_value
-from mdstopo.case.stages import stage_count
+from mdstopo.case.responses.response_units import constrained, unit_of_bound, unit_of_value
 from mdstopo.limiting.compare import kept_iterates
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.scenery import Floats

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.response_units import unit_of_value
+from mdstopo.case.responses.response_units import unit_of_value
 from mdstopo.plots.animation import still
 from mdstopo.plots.source import Source
 from mdstopo.report.fit_tables import fit_part

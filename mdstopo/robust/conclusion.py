@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdstopo.case.model import Case, Objective, ResponseRow
-from mdstopo.case.uncertain import Measure
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.design_problem import sign_of
 from mdstopo.evaluation import Evaluation, FloatArray
 from mdstopo.robust.ensemble import NOMINAL, Ensemble

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdstopo.case.model import Case, Objective, ResponseRow
-from mdstopo.case.uncertain import Measure
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.design_problem import competes, sign_of
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import USUAL, ErrorEstimate, Evaluation, FloatArray, Peak, Rows

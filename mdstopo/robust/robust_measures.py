@@ -31,8 +31,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.measures import MEASURES
-from mdstopo.case.uncertain import Measure
+from mdstopo.case.methods.measures import MEASURES
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.evaluation import FloatArray, Peak
 from mdstopo.robust.intervals import Estimate, order_statistics, student
 

@@ -14,7 +14,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.uncertain import Uncertainty
+from mdstopo.case.objects.uncertain import Uncertainty
 
 Floats = NDArray[np.float64]
 

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from mdstopo.case.candidates import pairs_of, with_members
-from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case, Uncertainty
 from mdstopo.case.reader import read_case
-from mdstopo.case.words import inside
+from mdstopo.case.scene.candidates import pairs_of, with_members
+from mdstopo.case.text.errors import CaseError, Mistake
+from mdstopo.case.text.words import inside
 from mdstopo.engine import Evaluator
 from mdstopo.robust.compatible_cases import other_problem
 from mdstopo.robust.sample import Sample

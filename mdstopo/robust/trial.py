@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.evaluation import FloatArray
 from mdstopo.robust.sample import Sample
 from mdstopo.robust.sampled_case import evaluator_at, name_of

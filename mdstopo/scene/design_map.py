@@ -17,12 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.errors import CaseError
-from mdstopo.case.following import expressions_of
+from mdstopo.case.design.following import expressions_of
+from mdstopo.case.design.movable import placed
 from mdstopo.case.model import Case, Following, MovablePoints, Variable, VolumeRow
-from mdstopo.case.movable import placed
 from mdstopo.case.reader import Document
-from mdstopo.case.words import number_text
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.words import number_text
 
 #: what places of points do not depend on, and what masses, loads and velocities do not
 _BESIDE_POINTS = (

@@ -1,11 +1,11 @@
 """Which family of kernels a case needs: that of springs between free bodies, or the general one."""
 
-from mdstopo.case.candidates import mirrored_groups
-from mdstopo.case.integrators import INTEGRATORS
+from mdstopo.case.methods.integrators import INTEGRATORS
+from mdstopo.case.methods.over_time import REDUCTIONS
+from mdstopo.case.methods.sensitivities import chosen
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
-from mdstopo.case.over_time import REDUCTIONS
-from mdstopo.case.responses import kind_of
-from mdstopo.case.sensitivities import chosen
+from mdstopo.case.responses.response_kinds import kind_of
+from mdstopo.case.scene.candidates import mirrored_groups
 from mdstopo.scene.signal_segments import formulas_of
 
 

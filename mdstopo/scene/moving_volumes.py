@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.design.movable import points_at, turned_out
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, VolumeRow
-from mdstopo.case.movable import points_at, turned_out
-from mdstopo.case.start_geometry import frames_of
+from mdstopo.case.scene.dimensions import frames_of
 from mdstopo.scene.bodies import distances
 from mdstopo.scene.design_map import DesignMap
 

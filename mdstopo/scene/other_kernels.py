@@ -3,7 +3,7 @@
 import importlib
 
 from mdstopo.case.model import Case, VolumeRow
-from mdstopo.case.responses import kind_of
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.compiler import store
 
 

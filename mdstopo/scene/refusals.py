@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mdstopo.case.candidates import mirrored_groups
-from mdstopo.case.errors import Mistake
-from mdstopo.case.integrators import INTEGRATORS
+from mdstopo.case.methods.integrators import INTEGRATORS
+from mdstopo.case.methods.sensitivities import chosen, having
 from mdstopo.case.model import Case, MemberGroup, Objective, Response, ResponseRow, VolumeRow
-from mdstopo.case.sensitivities import chosen, having
-from mdstopo.case.words import listed, number_text, shown
+from mdstopo.case.scene.candidates import mirrored_groups
+from mdstopo.case.text.errors import Mistake
+from mdstopo.case.text.words import listed, number_text, shown
 from mdstopo.scene.family import beyond_collocation, beyond_springs
 from mdstopo.scene.moving_volumes import moving_volumes
 from mdstopo.settings.optimizers import OPTIMIZERS

@@ -13,8 +13,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.candidates import are_there, lengths_between, some_candidates, spread
 from mdstopo.case.model import MemberGroup
+from mdstopo.case.scene.candidates import are_there, lengths_between, some_candidates, spread
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.sensitivity.springs_candidate_prices import (
     ABOVE,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, MemberGroup
-from mdstopo.case.over_time import REDUCTIONS
 from mdstopo.integrators.driver import Driver
 from mdstopo.integrators.scene_driver import DriverOptions
 from mdstopo.scene.compile_scene import Scene, compile_members, compile_scene, state_order

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from mdstopo.case.candidates import lengths_between
 from mdstopo.case.model import GROUND, MemberGroup, SpringLaw
+from mdstopo.case.scene.candidates import lengths_between
 from mdstopo.compiler.threads import allowed
 from mdstopo.integrators.steps import FIRST, WORK, carve
 from mdstopo.mechanics.kinematics.planar_poses import POSE

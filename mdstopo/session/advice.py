@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, FloatArray, Objective, ResponseRow, VolumeRow
-from mdstopo.case.responses import kind_of
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.scene.moving_volumes import spent
 from mdstopo.scene.point_positions import seats_at
 from mdstopo.starts.evaluator_interface import Evaluation

@@ -4,9 +4,9 @@ An error is measured relative to the objective. Where a response hardly is anyth
 from, rounding of that motion is more than the error that it may have, and steps are halved until they see it.
 """
 
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, Objective, ResponseRow
-from mdstopo.case.over_time import REDUCTIONS
-from mdstopo.case.response_units import constrained, unit_of_value, words
+from mdstopo.case.responses.response_units import constrained, unit_of_value, words
 from mdstopo.general.responses.extremes import VALUE
 
 #: steps that end where they do for the sake of integrals alone, from which on it is told, and how many times as many

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.errors import CaseError
+from mdstopo.case.design.stages import stage_count
 from mdstopo.case.model import Case
-from mdstopo.case.response_units import constrained, unit_of_bound
-from mdstopo.case.stages import stage_count
-from mdstopo.case.words import count_text
+from mdstopo.case.responses.response_units import constrained, unit_of_bound
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.words import count_text
 from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mdstopo.case.model import Case, ResponseRow
-from mdstopo.case.response_units import constrained
+from mdstopo.case.responses.response_units import constrained
 from mdstopo.design_problem import SIGNS
 from mdstopo.optimizer.state import State
 from mdstopo.status import RunStatus

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.catalogue import has_catalogue
-from mdstopo.case.errors import CaseError
+from mdstopo.case.design.catalogue import has_catalogue
+from mdstopo.case.design.stages import stage_count
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
-from mdstopo.case.stages import stage_count
-from mdstopo.case.words import count_text
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.words import count_text
 from mdstopo.optimizer.interface import run as run_optimizer
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.state import State

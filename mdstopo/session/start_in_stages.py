@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.catalogue import has_catalogue
+from mdstopo.case.design.catalogue import has_catalogue
+from mdstopo.case.design.stages import stage_case, stage_count
 from mdstopo.case.model import Case
-from mdstopo.case.stages import stage_case, stage_count
 from mdstopo.optimizer.problem import Problem, Sample
 from mdstopo.optimizer.state import History, State
 from mdstopo.starts.evaluator_interface import MakeEngine

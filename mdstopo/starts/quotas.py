@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.design.stages import stage_count
 from mdstopo.case.model import Case
-from mdstopo.case.stages import stage_count
 from mdstopo.optimizer.start_families import Family, begins_at_best, best_run, family_of, rank
 from mdstopo.optimizer.state import State
 from mdstopo.starts.single_start import StartTask

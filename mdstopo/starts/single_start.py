@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.optimizer.interface import Optimizer, make, reopen, run
 from mdstopo.optimizer.nearest_feasible import InfeasibleRows, project
 from mdstopo.optimizer.problem import Problem

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.columns import point_columns, reaction_columns, state_columns
 from mdstopo.case.model import Case
+from mdstopo.case.responses.columns import point_columns, reaction_columns, state_columns
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.whole_front import whole_front
 

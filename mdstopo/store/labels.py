@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mdstopo.case.columns import reaction_columns, state_columns, state_units
 from mdstopo.case.model import Case
-from mdstopo.case.response_units import unit_of_value
+from mdstopo.case.responses.columns import reaction_columns, state_columns, state_units
+from mdstopo.case.responses.response_units import unit_of_value
 from mdstopo.store.image import Value
 
 Datasets = dict[str, Value]

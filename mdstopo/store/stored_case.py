@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mdstopo.case.candidates import with_members
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.case.scene.candidates import with_members
 from mdstopo.store.contents import CANDIDATES
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.store_errors import DamagedError

@@ -4,8 +4,8 @@ import math
 import time
 import warnings
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.stress.scene import Outcome, Refused, Scene
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError, Mistake
 
 SMALL = """\
 format: 1

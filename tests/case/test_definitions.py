@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.cli.group import run_group
 from mdstopo.finalize.document import content_of
 from mdstopo.robust.sample import design_sample

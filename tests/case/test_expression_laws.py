@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.cli.group import run_group
 from mdstopo.finalize.scaled_laws import sized
 from mdstopo.robust.sample import design_sample

@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.scene.refusals import refusals
 
 from .scenes import EVERYTHING, SMALL

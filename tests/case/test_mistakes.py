@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.text.errors import CaseError
 
 from .scenes import EVERYTHING, SMALL, changed, mistakes, place
 

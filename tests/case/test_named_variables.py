@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdstopo.case.following import Expressions, expressions_of
+from mdstopo.case.design.following import Expressions, expressions_of
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.store.same_case import describe, differences

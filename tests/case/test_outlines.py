@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdstopo.case.mesh_files import MeshError, surface
+from mdstopo.case.geometry.mesh_files import MeshError, surface
+from mdstopo.case.geometry.svg_path import PathError, areas
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case, read_case
-from mdstopo.case.svg_path import PathError, areas
 from mdstopo.finalize.document import content_of
 from mdstopo.finalize.lift_case import lifted
 

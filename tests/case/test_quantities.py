@@ -5,11 +5,11 @@ import re
 
 import pytest
 
-from mdstopo.case.errors import CaseError
-from mdstopo.case.kinds import NUMBER
+from mdstopo.case.keys.kinds import NUMBER
 from mdstopo.case.model import Table
-from mdstopo.case.quantities import QuantityError, in_si
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.quantities import QuantityError, in_si
 
 CASE = """
 format: 1

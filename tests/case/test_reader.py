@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import (
     Body,
     GapLaw,
@@ -24,6 +23,7 @@ from mdstopo.case.model import (
     VolumeRow,
 )
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.text.errors import CaseError
 
 from .scenes import EVERYTHING, SMALL, changed, mistakes, small
 

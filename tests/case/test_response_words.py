@@ -2,10 +2,10 @@
 
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
-from mdstopo.case.responses import RESPONSES
-from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
+from mdstopo.case.responses.response_kinds import RESPONSES
+from mdstopo.case.responses.spatial_responses import SPATIAL_RESPONSES
+from mdstopo.case.text.errors import CaseError
 
 CASE = """
 format: 1

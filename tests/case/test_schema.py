@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from mdstopo.case.errors import CaseError
-from mdstopo.case.nodes import MAPPING, SEQUENCE, Node, parse
 from mdstopo.case.reader import load_case, read_case
-from mdstopo.case.schema_case import json_schema
+from mdstopo.case.schema.json_schema import json_schema
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.nodes import MAPPING, SEQUENCE, Node, parse
 from tests.tiers import examples
 
 from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL
@@ -96,7 +96,7 @@ NEW = st.sampled_from([DROP, *VALUES])
 @given(source=st.sampled_from(SOURCES), new=NEW, choose=st.randoms(use_true_random=False))
 @settings(max_examples=examples(60, 400), deadline=None, derandomize=True)
 def test_what_the_schema_refuses_the_reader_refuses(source: Any, new: Any, choose: Any) -> None:
-    from mdstopo.case.overrides import as_yaml
+    from mdstopo.case.text.overrides import as_yaml
 
     changed = with_value(source, choose.choice(places(source)), new)
     by_schema = not VALIDATOR.is_valid(changed)

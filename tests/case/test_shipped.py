@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import load_case
-from mdstopo.case.shipped import folder, names
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.shipped import folder, names
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig6.yaml"])

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mdstopo.case.arrays import Table
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS, SpatialDistanceJoint
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.model import Case, Load, SpatialBody
 from mdstopo.case.reader import read_case
-from mdstopo.case.response_units import unit_of
-from mdstopo.case.responses import kind_of
-from mdstopo.case.start_rotations import about_axis
+from mdstopo.case.responses.response_kinds import kind_of
+from mdstopo.case.responses.response_units import unit_of
 
 from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL, SPACE, changed, mistakes
 

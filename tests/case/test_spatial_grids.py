@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mdstopo.case.errors import CaseError
-from mdstopo.case.mesh_files import MeshError, vertices
+from mdstopo.case.geometry.mesh_files import MeshError, vertices
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.text.errors import CaseError
 
 from .scenes import SPACE, changed, mistakes
 

@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from mdstopo.case.nodes import DEEPEST
-from mdstopo.case.scalars import resolve
+from mdstopo.case.text.nodes import DEEPEST
+from mdstopo.case.text.scalars import resolve
 
 from .scenes import SMALL, changed, mistakes, small
 

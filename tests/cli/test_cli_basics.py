@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from mdstopo.case.key_tables import places
-from mdstopo.case.records import Record
-from mdstopo.case.schema_case import FORMAT
-from mdstopo.case.schema_space import SPACE_FORMAT
+from mdstopo.case.keys.records import Record
+from mdstopo.case.schema.key_tables import places
+from mdstopo.case.schema.schema_case import FORMAT
+from mdstopo.case.schema.schema_space import SPACE_FORMAT
 from mdstopo.cli.commands import COMMANDS, help_text
 from mdstopo.cli.group import cli, run_group
 

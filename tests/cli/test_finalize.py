@@ -13,7 +13,7 @@ from mdstopo.case.laws import LAWS
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Table
 from mdstopo.case.reader import load_case, read_case
-from mdstopo.case.yaml_text import text_of
+from mdstopo.case.text.yaml_text import text_of
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.document import _versions, content_of, final_content

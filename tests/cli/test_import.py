@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.case.yaml_text import text_of
+from mdstopo.case.text.yaml_text import text_of
 from mdstopo.cli.group import run_group
 from mdstopo.cli.import_points import ImportedError, path_points, points_in
 from mdstopo.cli.import_robots import robot_in

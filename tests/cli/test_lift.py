@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 import mdstopo
 from mdstopo.case.arrays import Signal, Table, TimeFormula
-from mdstopo.case.errors import CaseError
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case, read_case
-from mdstopo.case.start_rotations import about_axis
+from mdstopo.case.text.errors import CaseError
 from mdstopo.cli.group import run_group
 from mdstopo.finalize.lift_case import lifted
 from tests.tiers import examples

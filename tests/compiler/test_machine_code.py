@@ -258,8 +258,10 @@ def test_code_that_needs_more_of_numba_than_is_provided_goes_through_numba(monke
     def summed(x):
         return np.zeros(3).sum() + x[0]
 
+    from mdstopo.compiler.numba_private import entry_code
+
     private = numba_private()
-    monkeypatch.setattr(private, "PROVIDED", frozenset())
+    monkeypatch.setattr(entry_code, "PROVIDED", frozenset())
     assert private.build(summed.dispatcher, "d1") is None
     assert summed(np.full(1, 2.0)) == 2.0
     assert summed._native == {"d1": None}

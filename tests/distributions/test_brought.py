@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdstopo.case.distributions import Brought, BroughtError
+from mdstopo.case.keys.brought_records import Brought, BroughtError
 from mdstopo.store.result_reader import read_result
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -21,11 +21,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from mdstopo.case.aims import Response
-from mdstopo.case.kinds import POSITIVE, Ref
+from mdstopo.case.objects.aims import Response
+from mdstopo.case.keys.kinds import POSITIVE, Ref
 from mdstopo.case.laws.law import Law, free_length_key
-from mdstopo.case.records import Key, Record
-from mdstopo.case.responses import ResponseKind
+from mdstopo.case.keys.records import Key, Record
+from mdstopo.case.responses.response_kinds import ResponseKind
 from mdstopo.case.value import frozen, stated
 
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
-from mdstopo.case.nodes import MAPPING, SEQUENCE, Node, parse
-from mdstopo.case.overrides import as_yaml
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.nodes import MAPPING, SEQUENCE, Node, parse
+from mdstopo.case.text.overrides import as_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

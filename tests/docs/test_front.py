@@ -113,7 +113,7 @@ def test_options_that_pages_name_exist(name: str) -> None:
 
 def test_pages_name_every_integrator_sensitivity_and_preset() -> None:
     from mdstopo.api import METHODS as SENSITIVITIES
-    from mdstopo.case.integrators import INTEGRATORS
+    from mdstopo.case.methods.integrators import INTEGRATORS
     from mdstopo.settings.optimizer_presets import PRESETS
 
     heading = re.search(r"^\| \| (`.*) \|$", page("theory/integrators.md"), re.MULTILINE)

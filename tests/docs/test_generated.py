@@ -12,8 +12,9 @@ pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install -e '.
 
 from documentation import array_tables, command_pages, maths
 from documentation.hooks import expanded
-from mdstopo.case import key_tables
-from mdstopo.case.schema_case import FORMAT, json_schema
+from mdstopo.case.schema import key_tables
+from mdstopo.case.schema.json_schema import json_schema
+from mdstopo.case.schema.schema_case import FORMAT
 from mdstopo.cli.commands import COMMANDS, EXIT_STATUSES
 from mdstopo.cli.group import cli
 

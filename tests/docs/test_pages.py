@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.scene.refusals import refusals
 
 from .pages import DOCS, PAGES, ROOT, Block, blocks, case_with, commands, is_case, occurs

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.measurements import Measured
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.case.sections.measurements import Measured
 from mdstopo.fit.fit_problem import FitProblem
 
 #: a block on a spring, which it meets, leaves and meets again

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mdstopo.case.errors import CaseError
-from mdstopo.case.fitting import Estimate, FitNumber
+from mdstopo.case.objects.fitting import Estimate, FitNumber
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.fit.numbers import Numbers
 
 from .scenes import DROP

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdstopo.case.errors import CaseError
-from mdstopo.case.measurements import read_measured
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.sections.measurements import read_measured
+from mdstopo.case.text.errors import CaseError
 
 from .scenes import DROP
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from mdstopo.case.losses import LOSSES
-from mdstopo.case.measurements import Measured
+from mdstopo.case.methods.losses import LOSSES
+from mdstopo.case.sections.measurements import Measured
 from mdstopo.fit.least_squares import Minimum
 from mdstopo.fit.loss_functions import for_scipy, loss
 from mdstopo.fit.statistics import statistics

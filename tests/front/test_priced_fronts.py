@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdstopo.case import candidates
-from mdstopo.case.errors import CaseError
+from mdstopo.case.scene import candidates
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.front.directions import weights_of_first
 from mdstopo.front.run_front import Ask, run_front

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mdstopo
-from mdstopo.case import candidates
-from mdstopo.case.candidates import with_members
 from mdstopo.case.reader import read_case
+from mdstopo.case.scene import candidates
+from mdstopo.case.scene.candidates import with_members
 from mdstopo.engine import Evaluator
 from mdstopo.general.model.priced_candidates import FIRST_STAGE, KIND, POINT
 from mdstopo.sensitivity.springs_candidate_prices import ERROR

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.general.dynamics.general_contact import add_contacts
 from mdstopo.general.model.general_model import pack_general, unpack_general

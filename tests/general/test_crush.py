@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import CrushLaw
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.mechanics.laws import crush, law_table
 from mdstopo.status import Status
 from tests.compiled import compiled

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.integrators.esdirk_tables import STAGES, esdirk_tables
 from mdstopo.integrators.runge_kutta_tables import BB, E_Q, E_V, VECTORS, A, B, C

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.status import Status
 from tests.variables.support import differences, whole
 

@@ -9,9 +9,9 @@ import pytest
 
 import mdstopo
 from mdstopo.case.arrays import TimeFormula
-from mdstopo.case.errors import CaseError
+from mdstopo.case.keys.signals import combined
 from mdstopo.case.reader import read_case
-from mdstopo.case.signals import combined
+from mdstopo.case.text.errors import CaseError
 from mdstopo.general.scene.driven_integrals import integrated_ends, integration_times, row_of_motion
 from tests.variables.support import differences
 

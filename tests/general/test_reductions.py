@@ -9,7 +9,7 @@ import pytest
 import yaml
 from scipy.integrate import simpson
 
-from mdstopo.case.over_time import REDUCTIONS
+from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 

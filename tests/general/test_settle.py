@@ -8,8 +8,8 @@ from click.testing import CliRunner
 from scipy.optimize import brentq
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.cli.simulate import command as simulate_command
 from mdstopo.engine import Evaluator
 from mdstopo.status import Status

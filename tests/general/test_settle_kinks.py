@@ -5,8 +5,8 @@ import pytest
 import yaml
 from scipy.optimize import minimize
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 
 GRAVITY = 9.81

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.scene.refusals import refusals
 from tests.variables.support import differences, whole, widths

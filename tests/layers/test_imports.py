@@ -21,7 +21,7 @@ def contract(name: str) -> dict[str, list[str]]:
     return {key: text.split("\n") for key, text in parser[f"importlinter:contract:{name}"].items()}
 
 
-@pytest.mark.parametrize("name", ["layers", "general", "optimizer", "case"])
+@pytest.mark.parametrize("name", ["layers", "general", "case", "optimizer", "reading"])
 def test_a_contract_has_no_exceptions(name: str) -> None:
     assert not {key for key in contract(name) if key.startswith(("ignore", "allow", "unmatched"))}
 
@@ -32,7 +32,9 @@ def test_imports_for_types_count() -> None:
     assert not parser["importlinter"].getboolean("exclude_type_checking_imports", fallback=False)
 
 
-@pytest.mark.parametrize(("name", "folder"), [("layers", "mdstopo"), ("general", "mdstopo/general")])
+@pytest.mark.parametrize(
+    ("name", "folder"), [("layers", "mdstopo"), ("general", "mdstopo/general"), ("case", "mdstopo/case")]
+)
 def test_every_module_has_a_layer(name: str, folder: str) -> None:
     told = " ".join(contract(name)["layers"]).replace("|", " ").replace(":", " ").split()
     inside = list((ROOT / folder).iterdir())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdstopo.case.exchange import exchange_ends
+from mdstopo.case.design.exchange import exchange_ends
 from mdstopo.case.reader import read_case
 from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.start_families import Family, design_of_family, neighbour

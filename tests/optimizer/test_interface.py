@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.optimizer.interface import known_at_first, make, reopen, run
 from mdstopo.optimizer.state import State
 from mdstopo.scene.refusals import refusals

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdstopo.case.uncertain import Measure
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.evaluation import Peak
 from mdstopo.robust.robust_measures import MEANS, ROWS, rows, slopes, statistic
 

@@ -5,10 +5,10 @@ import re
 
 import pytest
 
-from mdstopo.case.errors import CaseError
-from mdstopo.case.number_distributions import Normal
+from mdstopo.case.methods.number_distributions import Normal
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.case.reader import read_case
-from mdstopo.case.uncertain import Measure
+from mdstopo.case.text.errors import CaseError
 from mdstopo.evaluators import evaluator_of
 from mdstopo.store.same_case import describe, differences
 from tests.robust.scenes import PARAMETERS, SCENARIOS, read, scene, text, uncertain

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import mdstopo
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.case.reader import read_case
-from mdstopo.case.uncertain import Measure
 from mdstopo.cli import _dispatch
 from mdstopo.evaluators import evaluator_of
 from mdstopo.robust import points_in_workers
@@ -306,7 +306,7 @@ def test_a_certain_case_imports_nothing_of_this(tmp_path):
     code = (
         "import sys, mdstopo; mdstopo.optimize(mdstopo.load_case('case.yaml')); "
         "print([name for name in sys.modules if name.startswith('mdstopo.robust') or name in "
-        "('mdstopo.case.uncertainty', 'statistics')])"
+        "('mdstopo.case.sections.uncertainty_section', 'statistics')])"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.stdout.strip() == "[]", done.stderr

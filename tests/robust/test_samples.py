@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mdstopo.case.number_distributions import DISTRIBUTIONS as RECORDS
-from mdstopo.case.number_distributions import Discrete, Lognormal, Normal, Uniform
-from mdstopo.case.uncertain import Measure
+from mdstopo.case.methods.number_distributions import DISTRIBUTIONS as RECORDS
+from mdstopo.case.methods.number_distributions import Discrete, Lognormal, Normal, Uniform
+from mdstopo.case.objects.uncertain import Measure
 from mdstopo.robust.intervals import student
 from mdstopo.robust.robust_measures import estimate
 from mdstopo.robust.sample import check_sample, design_sample, generators, lattice

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from mdstopo.case.candidates import spread, with_members
 from mdstopo.case.reader import read_case
+from mdstopo.case.scene.candidates import spread, with_members
 from mdstopo.engine import Evaluator
 from mdstopo.sensitivity.candidate_pass import SAMPLE, SMOOTH_ERROR
 from mdstopo.sensitivity.springs_candidate_prices import BEST, COMPUTED, ERROR, SEEN

@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case, VolumeRow
+from mdstopo.case.text.errors import CaseError
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.run_session import run_session
 from mdstopo.status import RunStatus

@@ -8,8 +8,8 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.finalize.lift_case import lifted
 from mdstopo.status import Status
 from tests.general.support import slopes

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.lift_case import lifted
 from tests.general.support import slopes

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 import mdstopo
-from mdstopo.case.movable import placed
+from mdstopo.case.design.movable import placed
 from mdstopo.case.reader import read_case
 from tests.variables.support import differences, whole, widths
 

@@ -7,8 +7,8 @@ import pytest
 import yaml
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from tests.general.support import slopes
 
 from .newton_euler import Scene, states

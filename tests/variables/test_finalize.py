@@ -7,10 +7,10 @@ import h5py
 import numpy as np
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import VolumeRow
 from mdstopo.case.reader import load_case, read_case
-from mdstopo.case.yaml_text import text_of
+from mdstopo.case.text.errors import CaseError
+from mdstopo.case.text.yaml_text import text_of
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.apart import apart, unlike

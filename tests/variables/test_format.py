@@ -2,10 +2,10 @@
 
 import pytest
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.laws import LAWS
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.mechanics.laws.law_table import COMMON, kernels_of, place_of
 
 SCENE = """

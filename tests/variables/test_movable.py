@@ -7,10 +7,10 @@ import pytest
 import yaml
 
 import mdstopo
-from mdstopo.case.errors import CaseError
-from mdstopo.case.movable import placed
+from mdstopo.case.design.movable import placed
+from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.reader import read_case
-from mdstopo.case.start_rotations import about_axis
+from mdstopo.case.text.errors import CaseError
 from mdstopo.finalize.finalize_design import finalize, opened, ready
 from mdstopo.finalize.lift_case import lifted
 from mdstopo.plots.source import Source

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.finalize_design import finalize, opened, ready
 from mdstopo.robust.ensemble import Ensemble

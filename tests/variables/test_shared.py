@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.session.run_session import run_session
 from tests.variables.support import whole_and_resumed

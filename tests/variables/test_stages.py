@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
+from mdstopo.case.design.stages import stage_case, stage_count
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
-from mdstopo.case.stages import stage_case, stage_count
+from mdstopo.case.text.errors import CaseError
 from mdstopo.session.outcome import Outcome
 from mdstopo.session.run_session import run_session
 from mdstopo.status import RunStatus

@@ -6,10 +6,10 @@ import math
 from typing import Any, ClassVar
 
 from mdstopo.case.joints.joint import TWO_POINTS, Joint, Stated
-from mdstopo.case.reading import Reading
-from mdstopo.case.records import Key
+from mdstopo.case.keys.records import Key
+from mdstopo.case.text.reading import Reading
+from mdstopo.case.text.words import inside
 from mdstopo.case.value import frozen
-from mdstopo.case.words import inside
 
 
 @frozen(kw_only=True)

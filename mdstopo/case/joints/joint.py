@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any, ClassVar, NamedTuple
 
 from mdstopo.case.arrays import Components, Pair
-from mdstopo.case.kinds import NUMBER, Name, Ref, Word
-from mdstopo.case.parts import AnyBody
-from mdstopo.case.reading import Fields, Reading
-from mdstopo.case.records import ByName, ByShape, Key, Record, Vector
+from mdstopo.case.geometry.rigid_bodies import AnyBody
+from mdstopo.case.keys.common_keys import PAIR
+from mdstopo.case.keys.kinds import Name, Ref, Word
+from mdstopo.case.keys.records import ByName, ByShape, Key, Record, Vector
+from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.value import Value, frozen
 
-PAIR = Vector(2, NUMBER, ((3, "three are for a case with `dimension: 3`"),))
 _OWN = ByName("body", PAIR, "[x, y]")
 #: a point that both bodies share, or each body's own
 POINT = ByShape("[x, y] or {body: [x, y], body: [x, y]}", sequence=PAIR, mapping=_OWN)

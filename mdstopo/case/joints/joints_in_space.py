@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.geometry.start_rotations import frame_with, parallel
 from mdstopo.case.joints.joint import Stated
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.joints.spatial_keys import AXES, POINT, TWO_POINTS, at, axis
-from mdstopo.case.reading import Reading
-from mdstopo.case.records import Key
-from mdstopo.case.start_rotations import frame_with, parallel
+from mdstopo.case.keys.records import Key
+from mdstopo.case.text.reading import Reading
+from mdstopo.case.text.words import inside
 from mdstopo.case.value import frozen
-from mdstopo.case.words import inside
 
 
 @frozen(kw_only=True)

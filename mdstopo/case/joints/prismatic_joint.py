@@ -6,9 +6,10 @@ import math
 from typing import Any, ClassVar
 
 from mdstopo.case.arrays import Pair
-from mdstopo.case.joints.joint import PAIR, POINT, Joint, Stated
-from mdstopo.case.reading import Reading
-from mdstopo.case.records import Direction, Key
+from mdstopo.case.joints.joint import POINT, Joint, Stated
+from mdstopo.case.keys.common_keys import PAIR
+from mdstopo.case.keys.records import Direction, Key
+from mdstopo.case.text.reading import Reading
 from mdstopo.case.value import frozen
 
 

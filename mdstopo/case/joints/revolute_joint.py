@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mdstopo.case.joints.joint import POINT, Joint
-from mdstopo.case.records import Key
+from mdstopo.case.keys.records import Key
 from mdstopo.case.value import frozen
 
 

@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Triple, read_only
+from mdstopo.case.geometry.start_rotations import frame_along, turning, unit
 from mdstopo.case.joints.joint import Joint, Stated
-from mdstopo.case.reading import BAD, Reading
-from mdstopo.case.start_rotations import frame_along, turning, unit
+from mdstopo.case.text.reading import BAD, Reading
+from mdstopo.case.text.words import inside, listed, shown
 from mdstopo.case.value import frozen
-from mdstopo.case.words import inside, listed, shown
 
 
 @frozen(kw_only=True)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.kinds import NUMBER
-from mdstopo.case.records import ByName, ByShape, Direction, Key, Vector
+from mdstopo.case.keys.common_keys import DIRECTION, TRIPLE
+from mdstopo.case.keys.records import ByName, ByShape, Key, Vector
 
-TRIPLE = Vector(3, NUMBER, ((2, "two are for a case in the plane"),))
-DIRECTION = Direction(TRIPLE)
 _OWN = ByName("body", TRIPLE, "[x, y, z]")
 _OWN_DIRECTION = ByName("body", DIRECTION, "[x, y, z]")
 #: a point that both bodies share, or each body's own

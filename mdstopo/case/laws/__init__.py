@@ -5,6 +5,7 @@ What a law does stands in `mdstopo.mechanics.laws`, in the module that its recor
 
 from typing import Any
 
+from mdstopo.case.keys.records import Record
 from mdstopo.case.laws.actuator_law import ActuatorLaw
 from mdstopo.case.laws.crush_law import CrushLaw
 from mdstopo.case.laws.cubic_law import CubicLaw
@@ -16,7 +17,6 @@ from mdstopo.case.laws.law import Law, record_of
 from mdstopo.case.laws.pulse_law import PulseLaw
 from mdstopo.case.laws.spring_law import SpringLaw
 from mdstopo.case.laws.table_law import TableLaw
-from mdstopo.case.records import Record
 
 #: the laws by their word; their codes in kernels follow this order
 LAWS: dict[str, type[Law]] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER
+from mdstopo.case.keys.kinds import NOT_NEGATIVE, NUMBER
 from mdstopo.case.laws.law import Law, Ranges, largest
 from mdstopo.case.value import frozen, stated
 

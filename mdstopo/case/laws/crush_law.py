@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.kinds import NUMBER, POSITIVE
+from mdstopo.case.keys.kinds import NUMBER, POSITIVE
 from mdstopo.case.laws.law import Law, Ranges, free_length_key, largest, side_key, sign_of, slack_before, stiffness_key
 from mdstopo.case.value import frozen, stated
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from mdstopo.case.kinds import NUMBER
+from mdstopo.case.keys.kinds import NUMBER
 from mdstopo.case.laws.law import Law, free_length_key, stiffness_key
 from mdstopo.case.value import frozen, stated
 

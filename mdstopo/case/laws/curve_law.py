@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mdstopo.case.arrays import FloatArray, read_only
+from mdstopo.case.keys.number_rows import Rows
 from mdstopo.case.laws.law import Law, free_length_key
-from mdstopo.case.number_rows import Rows
 from mdstopo.case.value import frozen, stated
 
 

@@ -6,13 +6,13 @@ import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from mdstopo.case.formula_keys import FormulaText, why_no_name
-from mdstopo.case.kinds import NUMBER, Schema
+from mdstopo.case.keys.formula_keys import FormulaText, why_no_name
+from mdstopo.case.keys.kinds import NUMBER, Schema
 from mdstopo.case.laws.law import Law, free_length_key
-from mdstopo.case.nodes import MAPPING, Node
-from mdstopo.case.reading import BAD, Fields, Reading, found
+from mdstopo.case.text.nodes import MAPPING, Node
+from mdstopo.case.text.reading import BAD, Fields, Reading, found
+from mdstopo.case.text.words import inside
 from mdstopo.case.value import Value, frozen, stated
-from mdstopo.case.words import inside
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.parser import WORD, parse
 from mdstopo.formula.tree import names_in

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.kinds import NUMBER, Flag
+from mdstopo.case.keys.kinds import NUMBER, Flag
 from mdstopo.case.laws.law import (
     Law,
     Ranges,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from mdstopo.case.kinds import NOT_NEGATIVE
+from mdstopo.case.keys.kinds import NOT_NEGATIVE
 from mdstopo.case.laws.law import Law
 from mdstopo.case.value import frozen, stated
 

@@ -14,9 +14,9 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Number, Word, explained
-from mdstopo.case.reading import Fields, Reading
-from mdstopo.case.records import Key, Record
+from mdstopo.case.keys.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Number, Word, explained
+from mdstopo.case.keys.records import Key, Record
+from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.value import Value, frozen, stated
 
 #: of a number of a law, by its name: the least and the largest value that it may take

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Joint
+from mdstopo.case.text.errors import CaseError
 from mdstopo.general.driver_interface import DriverWithStart
 from mdstopo.general.scene.extent import size_of, speed_of
 from mdstopo.mechanics.joints.joint_table import describe

@@ -13,7 +13,7 @@ the start, where the equilibrium jumps.
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
+from mdstopo.case.text.errors import CaseError
 from mdstopo.general.at_rest.joints_at_start import FITS
 from mdstopo.general.at_rest.since_settled import SinceSettled
 from mdstopo.general.driver_interface import DriverWithStart

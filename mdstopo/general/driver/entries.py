@@ -6,7 +6,7 @@ The latter know a method by its tag (`method_interface`).
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from mdstopo.case.integrators import IntegratorKind
+from mdstopo.case.methods.integrators import IntegratorKind
 from mdstopo.general.peaks import dense_output, peak_search, rows_with_gradients
 from mdstopo.general.sensitivity import direct, integral_gradients, row_sweep
 

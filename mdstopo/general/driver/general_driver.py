@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdstopo.case.memory import most_floats, room_factor
+from mdstopo.case.methods.over_time import ReductionKind
+from mdstopo.case.methods.sensitivities import SENSITIVITIES
 from mdstopo.case.model import GROUND, Case, MemberGroup
-from mdstopo.case.over_time import ReductionKind
-from mdstopo.case.responses import kind_of
-from mdstopo.case.sensitivities import SENSITIVITIES
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.at_rest.joints_at_start import fitted_start
 from mdstopo.general.at_rest.start import SettledStart

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.case.integrators import having
-from mdstopo.case.over_time import ReductionKind
-from mdstopo.case.sensitivities import SENSITIVITIES
+from mdstopo.case.methods.integrators import having
+from mdstopo.case.methods.over_time import ReductionKind
+from mdstopo.case.methods.sensitivities import SENSITIVITIES
 from mdstopo.general.driver.row_gradients import BLOCK, Block, sign_of, wanted_rows
 from mdstopo.general.responses.extremes import RATE, SIGN, parts, row_of
 from mdstopo.general.responses.integral_reductions import value_of_integral

@@ -7,7 +7,7 @@ and time.
 
 import numpy as np
 
-from mdstopo.case.over_time import ReductionKind
+from mdstopo.case.methods.over_time import ReductionKind
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import MEMBER_FORCE, SUBJECT
 from mdstopo.general.peaks.peak_search import ALIKE, EVEN, MARGIN

@@ -12,8 +12,8 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from mdstopo.case.responses import RESPONSES, ResponseKind
-from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
+from mdstopo.case.responses.response_kinds import RESPONSES, ResponseKind
+from mdstopo.case.responses.spatial_responses import SPATIAL_RESPONSES
 from mdstopo.compiler import store
 from mdstopo.compiler.choice_by_code import Listed, chosen
 from mdstopo.compiler.jit import by_type, kernel, part

@@ -1,4 +1,4 @@
-"""What becomes of an integral over time: the formulas of the reductions that follow from one (`case.over_time`).
+"""What becomes of an integral over time: formulas of the reductions that follow from one (`case.methods.over_time`).
 
 Each is called with the integral of the response, or of its square, and the simulated time (s). It returns the value and
 its derivative by the integral.
@@ -8,7 +8,7 @@ import functools
 import math
 from pkgutil import resolve_name
 
-from mdstopo.case.over_time import ReductionKind
+from mdstopo.case.methods.over_time import ReductionKind
 
 _function = functools.cache(resolve_name)
 

@@ -1,6 +1,6 @@
 """How the value of a response comes from what it is formed of: as it is, as an absolute value, or as a norm."""
 
-from mdstopo.case.over_time import ReductionKind
+from mdstopo.case.methods.over_time import ReductionKind
 from mdstopo.evaluation import Shape
 from mdstopo.general.model.general_model import GeneralModel
 from mdstopo.general.responses.general_responses import has_norm, is_absolute

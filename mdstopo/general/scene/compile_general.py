@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
+from mdstopo.case.methods.over_time import REDUCTIONS, ReductionKind
 from mdstopo.case.model import GROUND, Case, LoadCase, MemberGroup, Response, ResponseRow
-from mdstopo.case.over_time import REDUCTIONS, ReductionKind
-from mdstopo.case.responses import kind_of
+from mdstopo.case.responses.response_kinds import kind_of
+from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import allowed
 from mdstopo.general.model.general_model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel, without_numbers
 from mdstopo.general.responses import general_responses

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
-from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case, LoadCase
-from mdstopo.case.prescribed import KINDS
+from mdstopo.case.scene.prescribed import KINDS
+from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.formulas import FormulaCalls
 from mdstopo.formula.time_formulas import VALUE
 from mdstopo.general.scene.timed_loads import mistake_of, modes, row_of_formula

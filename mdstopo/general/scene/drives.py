@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
+from mdstopo.case.geometry.spline import slopes
 from mdstopo.case.model import LoadCase, Motion, Prescribed, Table
-from mdstopo.case.spline import slopes
 from mdstopo.general.scene.dimension import Dimension
 from mdstopo.general.scene.driven_integrals import integrated_ends, row_of_motion
 from mdstopo.general.scene.timed_loads import at_ends, modes

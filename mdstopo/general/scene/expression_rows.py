@@ -1,8 +1,8 @@
 """Expressions of responses as rows of `GeneralModel.response`, with their data among those of laws."""
 
-from mdstopo.case.aims import Response
-from mdstopo.case.expression_response import program_of
-from mdstopo.case.responses import kind_of
+from mdstopo.case.objects.aims import Response
+from mdstopo.case.responses.expression_response import program_of
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.compiler.formulas import address_of
 from mdstopo.general.model.expressions import BALANCED, BY_STATE, ENERGETIC, EXPRESSION, FORCED, ROOT, TIMED
 from mdstopo.general.responses.general_responses import LISTED, code_of

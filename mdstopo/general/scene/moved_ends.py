@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdstopo.case.design.movable import points_at, turned_out
 from mdstopo.case.model import GROUND, Case, LoadCase, MemberGroup, MovablePoints
-from mdstopo.case.movable import points_at, turned_out
-from mdstopo.case.start_geometry import frames_of
+from mdstopo.case.scene.dimensions import frames_of
 from mdstopo.general.model.general_model import (
     COUNT,
     FIRST_END,

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.errors import CaseError
-from mdstopo.case.following import expressions_of
+from mdstopo.case.design.following import expressions_of
 from mdstopo.case.model import GROUND, Case, LoadCase
+from mdstopo.case.text.errors import CaseError
 from mdstopo.general.model.general_model import VARIED_COLUMNS, GeneralModel, pack_general
 from mdstopo.general.scene.dimension import dimension_of
 from mdstopo.general.scene.further_times import landed

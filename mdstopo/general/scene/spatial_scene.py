@@ -11,7 +11,7 @@ import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
 from mdstopo.case.model import GROUND, Case, Joint, Load, LoadCase, Response, Signal
-from mdstopo.case.responses import kind_of
+from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.compiler.kernel import Kernel
 from mdstopo.general.scene.contact_compile import surface_rows
 from mdstopo.general.scene.dimension import Dimension, Frames, Pairs, in_frame

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mdstopo.case.arrays import TimeFormula
-from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import GROUND, Case, LoadCase
+from mdstopo.case.text.errors import CaseError, Mistake
 from mdstopo.compiler.formulas import FormulaCalls, address_of
 from mdstopo.formula.time_formulas import MARGIN, VALUE
 from mdstopo.general.responses.sampled_roots import may_vanish, roots_between

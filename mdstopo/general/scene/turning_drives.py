@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdstopo.case.geometry.start_rotations import frame_along
 from mdstopo.case.model import PrescribedRotation
-from mdstopo.case.start_rotations import frame_along
 from mdstopo.general.model.general_model import GeneralModel
 from mdstopo.general.scene.drives import cubics_of
 from mdstopo.mechanics.kinematics.spatial_drives import ROW

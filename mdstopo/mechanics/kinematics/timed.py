@@ -7,7 +7,7 @@ from the start of the segment, by Gauss' quadrature; segments are so short that 
 
 import numpy as np
 
-from mdstopo.case.time_formula import MOST_PARAMETERS
+from mdstopo.case.keys.time_formula import MOST_PARAMETERS
 from mdstopo.compiler.formulas import call_formula
 from mdstopo.compiler.jit import part
 from mdstopo.formula.time_formulas import VALUE

@@ -1,0 +1,1 @@
+"""Rigid bodies at the start, rotations, point grids, and what is drawn of bodies."""
