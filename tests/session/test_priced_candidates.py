@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -360,7 +361,13 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("changes", "key", "words"), REFUSED, ids=[words for _, _, words in REFUSED])
-def test_what_does_not_go_with_prices_is_refused(changes: dict[str, Any], key: str, words: str) -> None:
+def test_what_does_not_go_with_prices_is_refused_before_anything_is_compiled(
+    changes: dict[str, Any], key: str, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def begun(*_: object, **__: object) -> None:
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr(subprocess, "Popen", begun)
     case = case_from(engine(**changes))
     (mistake,) = refusals(case)
     assert mistake.path_key == key
