@@ -100,6 +100,8 @@ THOROUGH: dict[str, tuple[str, ...]] = {
         "equation[1e-05",
     ),
     "general/test_crush.py": ("agree[solver1]",),
+    "general/test_error_estimate.py": ("twenty[1e-05",),
+    "general/test_esdirk.py": ("digits[500.0", "digits[5000.0"),
     "general/test_expression_laws.py": (
         "alpha",
         "in_space_are_slopes",
@@ -110,8 +112,6 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     ),
     "general/test_formulas_of_time.py": ("steps_of_collocation",),
     "general/test_gauss_in_plane.py": ("tilted", "fourteen", "however_long", "explicit_or_implicit"),
-    "general/test_error_estimate.py": ("twenty[1e-05",),
-    "general/test_esdirk.py": ("digits[500.0", "digits[5000.0"),
     "general/test_gradients.py": ("agree[everything-", "computed[everything-generalized_alpha"),
     "general/test_integrands.py": (
         "passes_zero[integral-adjoint",
@@ -163,6 +163,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "sensitivity/test_agreement.py": ("generalized_alpha",),
     "sensitivity/test_candidate_prices.py": ("[runge_kutta", "[generalized_alpha"),
     "session/test_priced_candidates.py": ("bit[20", "bit[45", "members_with_slack"),
+    "session/test_runs_and_files.py": ("after_the_iteration[2",),
     "session/test_size_search.py": ("best_of_all_choices[2", "best_of_all_choices[3", "best_of_all_choices[4"),
     "session/test_sizes.py": ("stopped_choice",),
     "session/test_starts_in_quotas.py": (
@@ -191,6 +192,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "space/test_orders_in_space.py": ("[gauss",),
     "space/test_windows.py": ("",),
     "stress/test_stress.py": ("alpha", "periods-", "turns-wheel", "turns-driven", "-slow-"),
+    "test_packaging.py": ("older_one[False",),
     "variables/test_crush.py": (
         "alpha",
         "-compression]",
