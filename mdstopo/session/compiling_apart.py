@@ -26,6 +26,7 @@ from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.plan.pricing import price
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
+from mdstopo.scene.refusals import refusals
 from mdstopo.starts.evaluator_interface import even, problem_of
 from mdstopo.starts.getting_ready import FEW, get_ready, load_optimizer, motions
 from mdstopo.warm import compilation_due, compiling, needs_general, tiny
@@ -37,9 +38,10 @@ FEW_CANDIDATES = 1000
 
 
 def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
-    """Compile what the case needs in another process, unless it is known to be cached."""
+    """Compile what the case needs in another process, unless it is known to be cached; nothing of one that the engine
+    refuses."""
     marker = _marker(case)
-    if is_kept(marker.name):
+    if is_kept(marker.name) or refusals(case):
         return
     try:
         marker.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

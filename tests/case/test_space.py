@@ -21,6 +21,7 @@ from mdstopo.case.model import Case, Load, SpatialBody
 from mdstopo.case.reader import read_case
 from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.responses.response_units import unit_of
+from tests.tiers import examples
 
 from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL, SPACE, changed, mistakes
 
@@ -121,7 +122,7 @@ def test_an_inertia_that_no_body_has_is_refused(inertia: str, message: str) -> N
 
 
 @given(moments=st.tuples(*[st.floats(0.1, 10)] * 3), axis=DIRECTIONS, angle=st.floats(-4, 4))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=examples(25, 60), deadline=None, derandomize=True)
 def test_a_turned_tensor_is_judged_by_its_principal_moments(
     moments: tuple[float, float, float], axis: tuple[float, float, float], angle: float
 ) -> None:
@@ -136,7 +137,7 @@ def test_a_turned_tensor_is_judged_by_its_principal_moments(
 
 
 @given(axis=DIRECTIONS, angle=st.floats(-7, 7), length=st.floats(1e-3, 1e3))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=examples(25, 60), deadline=None, derandomize=True)
 def test_all_forms_of_an_orientation_are_one(axis: tuple[float, float, float], angle: float, length: float) -> None:
     along = np.array(axis) / np.linalg.norm(axis)
     expected = Rotation.from_rotvec(angle * along)
@@ -354,7 +355,7 @@ def test_a_universal_joint_carries_one_axis_on_each_body() -> None:
 
 
 @given(first=DIRECTIONS, second=DIRECTIONS)
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=examples(20, 40), deadline=None, derandomize=True)
 def test_axes_that_misfit_are_kept_and_differ_by_the_shortest_turn(
     first: tuple[float, float, float], second: tuple[float, float, float]
 ) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mdstopo.case.geometry.mesh_files import MeshError, vertices
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.text.errors import CaseError
+from tests.tiers import examples
 
 from .scenes import SPACE, changed, mistakes
 
@@ -74,7 +75,7 @@ def test_the_cylinder_is_circles_from_end_to_end() -> None:
 
 
 @given(n=st.tuples(*[st.integers(1, 5)] * 3), start=POINT, end=POINT)
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=examples(20, 40), deadline=None, derandomize=True)
 def test_the_box_is_what_of_the_lattice_is_on_its_surface(
     n: tuple[int, int, int], start: tuple[float, ...], end: tuple[float, ...]
 ) -> None:
@@ -87,7 +88,7 @@ def test_the_box_is_what_of_the_lattice_is_on_its_surface(
 
 
 @given(center=POINT, normal=DIRECTION, start=DIRECTION, radius=st.floats(0.1, 10), n=st.integers(1, 12))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=examples(25, 60), deadline=None, derandomize=True)
 def test_points_of_a_circle_have_its_radius_lie_in_its_plane_and_are_evenly_spaced(
     center: tuple[float, ...], normal: tuple[float, ...], start: tuple[float, ...], radius: float, n: int
 ) -> None:
@@ -217,7 +218,7 @@ def test_files_that_are_no_mesh_are_refused(tmp_path: Path, name: str, data: byt
 
 
 @given(points=st.lists(st.tuples(*[st.floats(-1e3, 1e3, width=32)] * 3), min_size=3, max_size=12))
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=examples(20, 40), deadline=None, derandomize=True)
 def test_binary_and_ascii_files_have_the_same_vertices(points: list[tuple[float, float, float]]) -> None:
     points = points[: len(points) - len(points) % 3]
     facets = [points[i : i + 3] for i in range(0, len(points), 3)]

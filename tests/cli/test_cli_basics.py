@@ -45,8 +45,20 @@ def test_help_and_version_load_nothing_heavy_not_even_click() -> None:
 
 
 def test_the_help_of_a_command_loads_nothing_heavy() -> None:
-    for name in COMMANDS:
-        assert imported_by([name, "--help"]).isdisjoint(HEAVY), name
+    """All commands in turn in one process: the first one that loads something is told."""
+    script = (
+        "import sys\n"
+        "from mdstopo.cli.commands import COMMANDS\n"
+        "from mdstopo.cli.group import run_group\n"
+        "for name in COMMANDS:\n"
+        "    assert run_group([name, '--help']) == 0\n"
+        "    print(name, *{module.partition('.')[0] for module in sys.modules}, file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    loaded = [line.split() for line in done.stderr.splitlines()]
+    assert [name for name, *_ in loaded] == list(COMMANDS)
+    for name, *modules in loaded:
+        assert set(modules).isdisjoint(HEAVY), name
 
 
 def test_every_command_of_the_table_exists_and_the_help_names_it() -> None:

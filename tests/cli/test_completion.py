@@ -1,5 +1,7 @@
 """What a shell is offered when TAB is pressed."""
 
+import contextlib
+import io
 import os
 import subprocess
 import sys
@@ -9,14 +11,18 @@ import pytest
 
 from mdstopo.cli.commands import COMMANDS
 from mdstopo.cli.completion import SHELLS
+from mdstopo.cli.group import run_group
 
 #: env runs programs, not functions: so does the script of click
 AS_BASH = """
 printf '#!/bin/sh\\nexec "{python}" -m mdstopo "$@"\\n' > "$HOME/mdstopo"; chmod +x "$HOME/mdstopo"; PATH="$HOME:$PATH"
 eval "$(mdstopo completion bash)"
-COMP_WORDS=({words}); COMP_CWORD={place}
-$(complete -p mdstopo | sed 's/.*-F \\([^ ]*\\).*/\\1/') mdstopo
-printf '%s\\n' "${{COMPREPLY[@]}}"
+complete=$(complete -p mdstopo | sed 's/.*-F \\([^ ]*\\).*/\\1/')
+"""
+ASKED = """
+COMP_WORDS=({words}); COMP_CWORD={place}; COMPREPLY=()
+$complete mdstopo
+printf '%s ' "${{COMPREPLY[@]}}"; echo
 """
 
 
@@ -38,41 +44,44 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def completed(*words: str) -> list[str]:
-    """The choices in a bash that has read the script, the last word being typed."""
-    quoted = " ".join(f"'{word}'" for word in ("mdstopo", *words))
-    script = AS_BASH.format(python=sys.executable, words=quoted, place=len(words))
+def completed(*lines: list[str]) -> list[list[str]]:
+    """The choices of each line in a bash that has read the script, the last word being typed."""
+    script = AS_BASH.format(python=sys.executable)
+    for words in lines:
+        quoted = " ".join(f"'{word}'" for word in ("mdstopo", *words))
+        script += ASKED.format(words=quoted, place=len(words))
     environment = {**os.environ, "HOME": os.getcwd()}
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True, env=environment)
     assert done.stderr == ""
-    return done.stdout.splitlines()
+    return [line.split() for line in done.stdout.splitlines()]
 
 
-def asked(shell: str, words: str, place: int) -> subprocess.CompletedProcess[str]:
-    """The program, asked as the shell's script asks it."""
-    question = {"_MDSTOPO_COMPLETE": f"{shell}_complete", "COMP_WORDS": words, "COMP_CWORD": str(place)}
-    environment = {**os.environ, **question}
-    return subprocess.run(
-        [sys.executable, "-X", "importtime", "-m", "mdstopo"],
-        capture_output=True,
-        text=True,
-        env=environment,
-        check=True,
-    )
+def question(words: str, place: int) -> dict[str, str]:
+    """What bash's script asks the program with."""
+    return {"_MDSTOPO_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(place)}
 
 
 def offered(words: str, place: int) -> list[str]:
-    """Types and values of the choices."""
-    return asked("bash", words, place).stdout.split()
+    """Types and values of the choices, by the program's commands in this process."""
+    said = io.TextIOWrapper(io.BytesIO(), "utf-8")
+    with pytest.MonkeyPatch.context() as changed, contextlib.redirect_stdout(said):
+        for name, value in question(words, place).items():
+            changed.setenv(name, value)
+        with pytest.raises(SystemExit, match="0"):
+            run_group([])
+    return said.buffer.getvalue().decode().split()
 
 
 def test_bash_completes_commands_options_values_and_files():
-    assert completed("") == list(COMMANDS)
-    assert completed("si") == ["simulate"]
-    assert completed("run", "--o") == ["--out", "--overwrite"]
-    assert completed("gradient", "--method", "") == ["adjoint", "direct", "iterative", "constant_load"]
-    assert completed("completion", "f") == ["fish"]
-    assert completed("check", "ca") == ["cases/a.yaml", "cases/b.yml", "cargo", "catch"]  # the last two come with it
+    choices = {
+        ("",): list(COMMANDS),
+        ("si",): ["simulate"],
+        ("run", "--o"): ["--out", "--overwrite"],
+        ("gradient", "--method", ""): ["adjoint", "direct", "iterative", "constant_load"],
+        ("completion", "f"): ["fish"],
+        ("check", "ca"): ["cases/a.yaml", "cases/b.yml", "cargo", "catch"],  # the last two come with it
+    }
+    assert completed(*map(list, choices)) == list(choices.values())
 
 
 def test_cases_results_and_designs_are_offered_by_their_endings():
@@ -102,22 +111,26 @@ def test_hidden_files_are_offered_where_a_dot_is_typed():
 
 def test_completing_loads_nothing_heavy():
     for words, place in (("mdstopo s", 1), ("mdstopo run cases/", 2)):
-        loaded = asked("bash", words, place).stderr
+        done = subprocess.run(
+            [sys.executable, "-X", "importtime", "-m", "mdstopo"],
+            capture_output=True,
+            text=True,
+            env={**os.environ, **question(words, place)},
+            check=True,
+        )
+        assert done.stdout
+        loaded = done.stderr
         assert not {name for name in ("numpy", "numba", "h5py", "rich", "yaml") if f" {name}\n" in loaded}
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_there_is_a_script_for_every_shell(shell):
-    done = subprocess.run(
-        [sys.executable, "-m", "mdstopo", "completion", shell], capture_output=True, text=True, check=True
-    )
-    assert f"_MDSTOPO_COMPLETE={shell}_complete" in done.stdout
-    assert done.stderr == ""
+def test_there_is_a_script_for_every_shell(shell, capsys):
+    assert run_group(["completion", shell]) == 0
+    said = capsys.readouterr()
+    assert f"_MDSTOPO_COMPLETE={shell}_complete" in said.out
+    assert said.err == ""
 
 
-def test_another_shell_is_refused():
-    done = subprocess.run(
-        [sys.executable, "-m", "mdstopo", "completion", "csh"], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2
-    assert "'csh' is not one of" in done.stderr
+def test_another_shell_is_refused(capsys):
+    assert run_group(["completion", "csh"]) == 2
+    assert "'csh' is not one of" in capsys.readouterr().err

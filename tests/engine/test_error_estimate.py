@@ -8,8 +8,9 @@ import pytest
 from mdstopo import evaluate
 from mdstopo.error_estimate import ROUNDING
 from tests.engine.scenes import FEATURES, paper, random_design, random_scene, read, with_solver
+from tests.tiers import examples
 
-SCENES = 30
+SCENES = examples(15, 30)
 OTHER = {"gauss": "runge_kutta", "runge_kutta": "gauss", "generalized_alpha": "gauss"}
 
 

@@ -12,6 +12,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.integrators.esdirk_tables import STAGES, esdirk_tables
 from mdstopo.integrators.runge_kutta_tables import BB, E_Q, E_V, VECTORS, A, B, C
 from mdstopo.status import Status
+from tests.tiers import examples
 from tests.variables.support import differences
 
 OWN = slice(STAGES)
@@ -114,27 +115,25 @@ def test_what_is_infinitely_stiff_is_damped_in_one_step() -> None:
     assert max(growth(complex(0.0, y)) for y in np.logspace(-2, 4, 200)) <= 1.0 + 1e-12
 
 
-def test_stiff_dampers_cost_no_steps_and_no_digits() -> None:
-    steps = []
-    for damping in (500.0, 5e3, 5e6):
-        case = pendulum(damping, integrator="esdirk", tolerance=1e-5)
-        found = mdstopo.evaluate(case)
-        assert found.status.ok
-        assert found.work["steps"] <= 2000
-        steps.append(found.work["steps"])
-        exact = mdstopo.evaluate(pendulum(damping, integrator="esdirk", tolerance=1e-8))
-        other = mdstopo.evaluate(case, method="direct")
-        for name in found.objectives:
-            assert found.objectives[name] == pytest.approx(exact.objectives[name], rel=1e-4)
-            assert found.gradients[name] == pytest.approx(exact.gradients[name], rel=1e-3)
-            assert other.gradients[name] == pytest.approx(found.gradients[name], rel=1e-9)
+@pytest.mark.parametrize("damping", [500.0, 5e3, 5e6])
+def test_stiff_dampers_cost_no_steps_and_no_digits(damping: float) -> None:
+    case = pendulum(damping, integrator="esdirk", tolerance=1e-5)
+    found = mdstopo.evaluate(case)
+    assert found.status.ok
+    assert found.work["steps"] <= 2000
+    exact = mdstopo.evaluate(pendulum(damping, integrator="esdirk", tolerance=1e-8))
+    other = mdstopo.evaluate(case, method="direct")
+    for name in found.objectives:
+        assert found.objectives[name] == pytest.approx(exact.objectives[name], rel=1e-4)
+        assert found.gradients[name] == pytest.approx(exact.gradients[name], rel=1e-3)
+        assert other.gradients[name] == pytest.approx(found.gradients[name], rel=1e-9)
 
 
 @pytest.fixture(scope="module")
 def slopes() -> list[dict[str, float]]:
     """Differences of a tight run on a stiff damper, along each of `ALONG`."""
     case = pendulum(5000.0, integrator="esdirk", tolerance=1e-8)
-    return [differences(case, np.full(2, 0.5), along, 1e-3) for along in ALONG]
+    return [differences(case, np.full(2, 0.5), along, 1e-3) for along in ALONG[: examples(1, 2)]]
 
 
 @pytest.mark.parametrize("integrator", ["esdirk", "runge_kutta"])
@@ -143,7 +142,7 @@ def test_gradients_are_right_where_a_damper_is_stiff(integrator: str, slopes: li
     found = mdstopo.evaluate(pendulum(5000.0, integrator=integrator, tolerance=1e-6))
     for name, gradient in found.gradients.items():
         assert np.ptp(gradient) > 0.01 * np.abs(gradient).max()  # members are told from each other
-        for along, slope in zip(ALONG, slopes, strict=True):
+        for along, slope in zip(ALONG, slopes, strict=False):
             assert gradient @ along == pytest.approx(slope[name], rel=1e-5)
 
 
@@ -161,7 +160,7 @@ def test_a_stop_and_friction_agree_with_the_explicit_method() -> None:
 def test_bodies_at_rest_on_stiff_springs_are_followed_in_long_steps() -> None:
     """Newton's iteration ended as failed where bodies move by less than rounding in a step."""
     case = read_case(HANGING)
-    found, (one, other) = mdstopo.evaluate(case), (0.5, 0.5)
+    found, (one, other) = mdstopo.evaluate(case, method="direct"), (0.5, 0.5)
     height = -2.0 * 9.81 / (1e6 * (one + other))
     assert found.status.ok
     assert found.work["steps"] <= 300

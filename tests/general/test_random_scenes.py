@@ -72,7 +72,7 @@ def scene(seed):
     return "\n".join(lines) + "\n"
 
 
-@settings(max_examples=examples(8, 40), derandomize=True, deadline=None)
+@settings(max_examples=examples(5, 40), derandomize=True, deadline=None)
 @given(st.integers(0, 10**6))
 def test_gradients_of_random_scenes_are_exact(seed):
     case = read_case(scene(seed))

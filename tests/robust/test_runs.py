@@ -50,11 +50,12 @@ def assert_same(one, other):
 
 def test_no_number_of_processes_changes_a_bit(tmp_path):
     case = read(uncertain(DEVIATION, scenarios=SCENARIOS, sample=4))
-    for workers in (1, 2, 3):
+    others = (3, 2)[: examples(1, 2)]
+    for workers in (1, *others):
         mdstopo.optimize(case, path=tmp_path / f"{workers}.h5", workers=workers)
     one = arrays(tmp_path / "1.h5")
     assert one["iterations/objectives"].shape[0] > 3
-    for workers in (2, 3):
+    for workers in others:
         assert_same(one, arrays(tmp_path / f"{workers}.h5"))
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -330,7 +331,7 @@ def test_the_optimum_of_one_objective_is_priced_by_its_own_kernels(few: None) ->
     scene = stiff()
     scene["objectives"] |= {"A": {"response": {"acceleration": {"body": "engine"}}, "over_time": "max"}}
     scene |= {"combine": {"method": "weighted_sum", "weights": {"G": 0.5, "A": 0.5}}}
-    scene["optimizer"] = {"max_iterations": 4}
+    scene["optimizer"] = {"max_iterations": 4, "tolerance": 0.01}  # soon no candidate gains more
     outcome = run_session(case_from(scene))  # G alone is the energy of springs between free bodies, with A it is not
     assert outcome.pricing is not None
     assert outcome.pricing.rounds >= 1
@@ -360,7 +361,13 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("changes", "key", "words"), REFUSED, ids=[words for _, _, words in REFUSED])
-def test_what_does_not_go_with_prices_is_refused(changes: dict[str, Any], key: str, words: str) -> None:
+def test_what_does_not_go_with_prices_is_refused_before_anything_is_compiled(
+    changes: dict[str, Any], key: str, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def begun(*_: object, **__: object) -> None:
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr(subprocess, "Popen", begun)
     case = case_from(engine(**changes))
     (mistake,) = refusals(case)
     assert mistake.path_key == key

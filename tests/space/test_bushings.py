@@ -143,7 +143,7 @@ PLANAR = """
 format: 1
 gravity: [0, -9.81]
 time: {end: 0.8}
-solver: {tolerance: 1e-11}
+solver: {integrator: runge_kutta, tolerance: 1e-11}
 bodies:
   a: {mass: 2, inertia: 0.3, position: [0.4, 0.1], angle: 0.4, velocity: [0.3, 0.2]}
   b: {mass: 1.5, inertia: 0.2, position: [1.2, 0.4], angular_velocity: 2}

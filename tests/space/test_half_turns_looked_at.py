@@ -33,7 +33,7 @@ def test_a_rotation_that_jumps_on_the_way_is_refused_by_name(over_time, componen
 
 def test_a_rotation_at_the_end_and_the_motion_itself_go_on_beyond_half_a_turn() -> None:
     case = spun("final", "norm")
-    found = mdstopo.evaluate(case)
+    found = mdstopo.evaluate(case, method="direct")
     assert found.status is Status.OK
     motion = mdstopo.simulate(case)
     w = motion.at(np.linspace(motion.t[0], motion.t[-1], 401)).q[:, 3:7]

@@ -9,6 +9,7 @@ import yaml
 import mdstopo
 from mdstopo.case.design.movable import placed
 from mdstopo.case.reader import read_case
+from tests.tiers import examples
 from tests.variables.support import differences, whole, widths
 
 from .support import CASES
@@ -50,7 +51,7 @@ def test_gradients_by_points_are_slopes(some: tuple[str, ...]) -> None:
     found = mdstopo.evaluate(case)
     assert found.status.ok, found.message
     rng = np.random.default_rng(3)
-    for only_points in (True, False):
+    for only_points in (True, False)[: examples(1, 2)]:
         direction = 0.05 * rng.normal(size=len(case.start)) * widths(case)
         direction[: case.n_design] *= 1.0 - only_points
         for name, slope in differences(case, case.start, direction, 1e-3).items():
@@ -84,8 +85,9 @@ def test_moved_points_are_those_of_a_case_that_states_them() -> None:
             "body": stated["points"][name]["body"],
             "grid": {"list": there.points[name].world.tolist()},
         }
-    moved = mdstopo.evaluate(case, design[: case.n_design], variables=case.space.named(design))
-    fixed = mdstopo.evaluate(read_case(yaml.safe_dump(stated, sort_keys=False)), design[: case.n_design])
+    alpha, variables = design[: case.n_design], case.space.named(design)
+    moved = mdstopo.evaluate(case, alpha, variables=variables, gradient=False)
+    fixed = mdstopo.evaluate(read_case(yaml.safe_dump(stated, sort_keys=False)), alpha, gradient=False)
     assert moved.status.ok, moved.message
     for name, value in fixed.objectives.items():
         assert moved.objectives[name] == pytest.approx(value, rel=1e-8, abs=1e-10), name

@@ -1,10 +1,9 @@
 """`mdstopo stress` and what it rests on: choice of scenes, verdicts, scenes that hang, the documentation's page."""
 
 import json
-import os
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
 from mdstopo.stress import judge, registry, scene_watch, stress_page
 from mdstopo.stress.scene import Outcome, Refused, Scene
+from tests.stress.fake_scenes import open_fakes
 
 PAGE = Path(__file__).parents[2] / "docs" / "stress.md"
 
@@ -69,21 +69,9 @@ def test_scenes_are_chosen_by_family_name_and_beginning() -> None:
         registry.chosen(["weather"], long=False)
 
 
-def open_fakes(_: object) -> Callable[[str, object], tuple[str, float, str, float, str]]:
-    """In the other process: what computes no scene but ends, or takes long, where the name says so."""
-
-    def perform(name: str, _parent: object) -> tuple[str, float, str, float, str]:
-        if name == "ends":
-            os._exit(3)
-        time.sleep(60 if name == "hangs" else 0)
-        return "right", 0.0, "", 0.0, ""
-
-    return perform
-
-
 @pytest.fixture
 def watching(monkeypatch: pytest.MonkeyPatch) -> Iterator[scene_watch.Watch]:
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parents[1]), str(Path(__file__).parents[2])]))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
     monkeypatch.setattr(scene_watch, "compiled", lambda: True)
     with scene_watch.Watch(open_fakes) as found:
         yield found

@@ -227,7 +227,7 @@ RUN = (
     + """
 objectives: {X: {response: {displacement: {body: m, at: [0.1, 0.1]}}, over_time: max}}
 constraints: [{volume: all, limit: 20}]
-optimizer: {max_iterations: 8}
+optimizer: {max_iterations: 6}
 """
 )
 

@@ -9,7 +9,6 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,66 +17,17 @@ import pytest
 from mdstopo.compiler.threads import VARIABLE, cores
 from mdstopo.store.checkpoint import Checkpointer
 from mdstopo.workers import worker_pool
-from mdstopo.workers.worker_pool import Lost, Parent, StoppedError, TooLong, WorkerError, WorkerPool
+from mdstopo.workers.worker_pool import Lost, TooLong, WorkerError, WorkerPool
 from mdstopo.workers.worker_program import ToParent, _told
+from tests.workers.tasks_of_workers import open_broken, pool
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(autouse=True)
 def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers find the functions below."""
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), str(ROOT)]))
-
-
-def open_numbers(factor: int) -> Callable[[Any, Parent], Any]:
-    """What the workers of these tests do: a number, multiplied; or what a word says."""
-    done: list[Any] = []
-
-    def perform(task: Any, parent: Parent) -> Any:
-        done.append(task)
-        match task:
-            case int():
-                return factor * task
-            case "pid":
-                return os.getpid()
-            case "done":
-                return done[:-1]
-            case "threads":
-                return os.environ[VARIABLE], os.environ["NUMBA_NUM_THREADS"]
-            case "print":
-                print("this must not disturb")
-                return "printed"
-            case "sleep":
-                time.sleep(60.0)
-            case "raise":
-                raise ValueError("no such number")
-            case "local":
-                raise type("LocalError", (Exception,), {})("cannot be sent")
-            case "until stopped":
-                while not parent.stopped():
-                    parent.keep(lambda: "on the way")
-                    time.sleep(0.01)
-                raise StoppedError
-            case ("die", path):
-                parent.keep(lambda: "nearly")
-                if not Path(path).exists():
-                    Path(path).touch()
-                    os.kill(os.getpid(), signal.SIGKILL)
-                return "done by another one"
-            case ("always die", status):
-                os._exit(status)
-        raise AssertionError(task)
-
-    return perform
-
-
-def open_broken(_: object) -> Callable[[Any, Parent], Any]:
-    raise RuntimeError("cannot get ready")
-
-
-def pool(workers: int, **more: Any) -> WorkerPool:
-    return WorkerPool(open_numbers, 10, workers, **more)
+    """Workers find what they are to do."""
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
 
 
 @pytest.mark.parametrize("workers", [1, 3])
@@ -215,7 +165,7 @@ def test_closing_ends_workers_in_the_middle_of_what_they_do() -> None:
 def test_workers_end_with_their_parent_however_it_ends(how: str) -> None:
     code = """
         import sys
-        from tests.workers.test_worker_pool import pool
+        from tests.workers.tasks_of_workers import pool
         some = pool(2)
         results = some.results(3, lambda place: ("pid", "sleep", "sleep")[place])
         print(next(results)[1], flush=True)
