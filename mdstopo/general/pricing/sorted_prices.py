@@ -13,6 +13,7 @@ from mdstopo.compiler.vector import WIDE
 from mdstopo.general.model.priced_candidates import CODE, FIRST_STAGE, KIND, LAST_STAGE, MOVES, WHOLE
 from mdstopo.general.pricing.certain_modes import BOUND_LEVELS, NARROW, UNSURE, modes_at_nodes
 from mdstopo.general.pricing.loaded_members import add_states, load_all, load_members, take_members
+from mdstopo.general.pricing.sorted_by_lines import sort_by_lines
 from mdstopo.general.pricing.sorted_members import (
     CLASSES,
     COUNT,
@@ -22,6 +23,7 @@ from mdstopo.general.pricing.sorted_members import (
     join_class,
     modes_of_all,
     sort_members,
+    sort_places,
 )
 from mdstopo.general.pricing.switching_prices import ROW, price_step
 from mdstopo.general.pricing.switching_together import SUM, TOGETHER, is_quick, price_switched
@@ -92,10 +94,12 @@ def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile,
     to = np.int64(0) if candidates.step[s, KIND] == WHOLE else np.int64(1)
     done = 0.0
     for c in range(CLASSES):
+        if classes[c, COUNT] == 0:
+            continue
         stays = classes[c, FROM] == classes[c, TO]
         if stays and smooth and classes[c, COUNT] > FEW and not law_is_idle(code, classes[c, FROM]):
             done += _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price)
-        if classes[c, COUNT] > 0 and (stays or is_quick(code, candidates.law[k], model.curves)):
+        if stays or is_quick(code, candidates.law[k], model.curves):
             done += _price_each(model, candidates, k, s, first, size, c, height, to, tile[3], buffers, price)
         else:
             for m in range(_places_of(kind, c, first, size, height, places)):
@@ -127,8 +131,8 @@ def _places_of(kind, c, first, size, height, places):
 
 @kernel
 def _sort_part(model, candidates, k, s, level, first, height, buffers):
-    """Sort the members of a part by a law that does not remember: those of its halves, and so on, by bounds, and where
-    these do not tell member by member.
+    """Sort the members of a part by a law that does not remember: where margins are the least of linear functions by
+    bounds of each, else those of its halves, and so on, by bounds, and where these do not tell member by member.
 
     model, candidates, k, s, level, first: as of `price_part`.
     height: rows of the tile.
@@ -136,7 +140,14 @@ def _sort_part(model, candidates, k, s, level, first, height, buffers):
     """
     _, lists, spans, _, sorting, _ = buffers
     modes, sets = lists[4], lists[5]
-    kind, classes, mode, unsorted = sorting[0], sorting[1], sorting[3], sorting[5]
+    kind, classes, places, mode, unsorted = sorting[0], sorting[1], sorting[2], sorting[3], sorting[5]
+    if is_quick(candidates.run[k, CODE], candidates.law[k], model.curves):
+        tried = sort_by_lines(model, candidates, k, s, level, first, height, spans, sorting)
+        if tried >= 0:
+            count = _places_of(kind, np.int64(UNSORTED), first, BROAD >> level, height, places)
+            sort_places(model, candidates, k, s, places, count, tried, sorting)
+            return
+        classes[:] = 0
     begin = first // NARROW
     behind = begin + (BROAD >> level) // NARROW
     unsorted[begin:behind] = 1
