@@ -173,6 +173,8 @@ def sort_places(model, candidates, k, s, places, count, modes, sorting):
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     free = model.member[MEMBER_FREE_LENGTH]
+    inside = np.zeros((TRIED, NODES), np.int64)
+    outside = np.zeros((TRIED, NODES), np.int64)
     mode[:] = UNSURE
     for at in range(0, count, MANY):
         wide = min(MANY, count - at)
@@ -182,12 +184,17 @@ def sort_places(model, candidates, k, s, places, count, modes, sorting):
             member_works(model, np.int64(0), wide, candidates.node_pose[o], candidates.node_change[o], works[m])
         for i in range(0, wide, lanes()):
             left = (1 << min(wide - i, lanes())) - 1
-            for n in range(modes):
-                bits = _stay_in(n, i, sorting) & left
-                left &= ~bits
-                for lane in range(lanes() if bits != 0 else 0):
-                    if (bits >> lane) & 1 == 1:
-                        kind[places[at + i + lane]] = join_class(tried[n], tried[n], 1, classes)
+            _fill_masks(modes, i, sorting, inside, outside)
+            for old in range(modes):
+                for new in range(modes):
+                    bits = _that_go(inside[old], outside[old], inside[new], old == new) & left
+                    if bits == 0:
+                        continue
+                    left &= ~bits
+                    own = join_class(tried[old], tried[new], _how_many(bits), classes)
+                    for lane in range(lanes()):
+                        if (bits >> lane) & 1 == 1:
+                            kind[places[at + i + lane]] = own
             for lane in range(lanes() if left != 0 else 0):
                 if (left >> lane) & 1 == 1:
                     old, new = _modes_of(
@@ -196,6 +203,61 @@ def sort_places(model, candidates, k, s, places, count, modes, sorting):
                     )  # fmt: skip
                     own = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
                     kind[places[at + i + lane]] = own
+
+
+@part
+def _fill_masks(modes, i, sorting, inside, outside):
+    """Which members of a vector of them are in a mode at a node, and which are out of it, a bit for each.
+
+    In:
+      modes, i: how many modes are tried, and the first member.
+      sorting: of `make_sorting`.
+    Out:
+      inside, outside (TRIED, NODES): set; neither where rounding may decide.
+    """
+    works, tangent = sorting[4], sorting[7]
+    for m in range(NODES):
+        x = load(works[m, ELONGATION], i)
+        rate = load(works[m, RATE], i)
+        for n in range(modes):
+            over = zero() - np.inf
+            for corner in range(CORNERS):
+                own = tangent[n, corner]
+                value = own[BY_ELONGATION] * x + own[BY_RATE] * rate + own[AT_ZERO]
+                over = larger(over, zero() - value)
+            inside[n, m] = ~negative(zero() - over - (CLOSE if m == 0 else SURE))
+            outside[n, m] = negative(zero() - over + SURE)
+
+
+@part
+def _that_go(inside, outside, other, alike):
+    """A bit for each member that begins in a mode and ends in another, without a third one between.
+
+    inside, outside (NODES,): of the mode in which they begin, of `_fill_masks`; other (NODES,): of the one in which
+    they end, `inside`. alike: whether this is the same one.
+    """
+    found = np.int64(0)
+    before = inside[0]
+    if alike:
+        for m in range(1, NODES):
+            before &= inside[m]
+        return before
+    for m in range(1, NODES):
+        behind = before & outside[m]
+        for n in range(m, NODES):
+            behind &= other[n]
+        found |= behind
+        before &= inside[m]
+    return found
+
+
+@part
+def _how_many(bits):
+    """How many bits of a vector's lanes are set."""
+    count = np.int64(0)
+    for lane in range(lanes()):
+        count += (bits >> lane) & 1
+    return count
 
 
 @part

@@ -12,7 +12,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import WIDE
 from mdstopo.general.model.priced_candidates import CODE, FIRST_STAGE, KIND, LAST_STAGE, MOVES, WHOLE
 from mdstopo.general.pricing.certain_modes import BOUND_LEVELS, NARROW, UNSURE, modes_at_nodes
-from mdstopo.general.pricing.loaded_members import add_states, load_all, load_members, take_members
+from mdstopo.general.pricing.loaded_members import add_states, load_all, take_members
 from mdstopo.general.pricing.sorted_by_lines import sort_by_lines
 from mdstopo.general.pricing.sorted_members import (
     CLASSES,
@@ -39,7 +39,7 @@ from mdstopo.sensitivity.tile_interpolation import (
     begin_part,
     extent,
     next_candidates,
-    number_candidates,
+    place_candidates,
     take_prices,
 )
 
@@ -97,8 +97,11 @@ def price_part(model, candidates, k, s, level, first, size, smooth, begun, tile,
         if classes[c, COUNT] == 0:
             continue
         stays = classes[c, FROM] == classes[c, TO]
-        if stays and smooth and classes[c, COUNT] > FEW and not law_is_idle(code, classes[c, FROM]):
+        idle = stays and law_is_idle(code, classes[c, FROM])
+        if stays and smooth and classes[c, COUNT] > FEW and not idle:
             done += _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price)
+        if (idle or classes[c, COUNT] == 0) and not law_remembers(code):
+            continue
         if stays or is_quick(code, candidates.law[k], model.curves):
             done += _price_each(model, candidates, k, s, first, size, c, height, to, tile[3], buffers, price)
         else:
@@ -175,33 +178,34 @@ def _price_by_few(model, candidates, k, s, level, first, c, tile, buffers, price
     """Price the members of a part that stay in a mode from those of few of the part.
 
     model, candidates, k, s, level, first, tile, buffers, price: as of `price_part`.
-    c: the class. Members that have their prices are PAID then.
+    c: the class. Members that have their prices are PAID then, and in no class.
 
     Returns how many prices were computed.
     """
     grids, i, j, error = tile
     scratch, lists, _, following, sorting, _ = buffers
     found, works = lists[7], lists[10]
-    plan, part_level, _, _, index, values, _ = scratch
+    plan, part_level, _, _, _, values, _ = scratch
     kind, classes, places = sorting[0], sorting[1], sorting[2]
     step = candidates.step[s]
     height, _ = extent(grids, i, j)
     found[1, 0] = 0.0
     begin_part(level, first, scratch)
     while next_candidates(grids, i, j, scratch) and plan[LEVEL] < LEVELS:
-        members = number_candidates(i, j, scratch)
-        load_members(model, candidates, k, index, members, np.int64(0))
+        members = place_candidates(scratch, places)
+        take_members(model, places, members, members)
         values[:members] = 0.0
         add_states(
             model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], members, classes[c, FROM], found[1, :1], works,
             following, values,
         )  # fmt: skip
         take_prices(grids, i, j, error * SHARE_OF_A_CLASS, scratch, found[0])
-    for m in range(_places_of(kind, c, first, BROAD >> level, height, places)):
-        b = places[m]
-        if part_level[b % BROAD // SHORT] == DONE:
-            price[b] += found[0, b]
-            kind[b] = PAID
+    for a in range(height):
+        for b in range(a * BROAD + first, a * BROAD + first + (BROAD >> level)):
+            if kind[b] == c and part_level[b % BROAD // SHORT] == DONE:
+                price[b] += found[0, b]
+                kind[b] = PAID
+                classes[c, COUNT] -= 1
     return 1.0 * plan[PRICED]
 
 

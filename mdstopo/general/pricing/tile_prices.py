@@ -47,6 +47,7 @@ from mdstopo.sensitivity.tile_interpolation import (
     SHORT,
     TALL,
     begin_part,
+    begin_tile,
     extent,
     next_candidates,
     number_candidates,
@@ -105,11 +106,12 @@ def price_run(model, candidates, k, tile, scratch, lists, price):
     run = candidates.run[k]
     spans = make_spans(candidates.first.shape[1])
     buffers = (scratch, lists, spans, make_following(), make_sorting(), make_switching())
-    _, i, j, _ = tile
+    _, i, j, error = tile
     _, _, count, shared, modes, sets, todo, _, _, _, _ = lists
     for n in range(candidates.curves.shape[1]):
         model.curves[n] = candidates.curves[run[SCENE], n]
     fill_spans(candidates, k, i, j, spans)
+    begin_tile(error, scratch)
     count[:] = 0
     modes[:] = 0
     sets[:] = 0.0
