@@ -5,8 +5,8 @@ into it. On a dense grid the ends of a tile's candidates are near each other, so
 low degree in the numbers of the two points. So a part of a tile is priced at ROW_NODES by COLUMN_NODES candidates near
 the extremes of Chebyshev polynomials, its corners among them. Where the last coefficient of the series through these is
 below the error that is allowed, and the one before it not far above, in either direction, all others are what the
-polynomial says. Where those by the columns are larger, the part is halved; where those by the rows are, every row is
-priced at the nodes of the columns. What remains is priced one by one.
+polynomial says. Where those by the columns are larger, the part is halved; where those by the rows are, more rows are
+tried, and then every row is priced at the nodes of the columns. What remains is priced one by one.
 
 A kernel that prices members is told here which candidates to price next (`next_candidates`), and gives their prices
 back (`take_prices`).
@@ -24,8 +24,12 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 #: rows and columns of a tile, and its places
 TALL, BROAD = 16, 128
 PLACES = TALL * BROAD
-#: candidates of a part of a tile that are priced, by rows and by columns
-ROW_NODES, COLUMN_NODES = 6, 8
+#: candidates of a part of a tile that are priced, by columns and by rows: of these so many are tried, then so many,
+#: then all
+COLUMN_NODES = 8
+ROW_NODES: IndexArray = np.array([6, 9], dtype=np.int64)
+MOST_ROW_NODES = 9
+ALL_ROWS = 2
 #: how often a tile is halved, and one more; columns of the smallest parts, and how many there are in a tile
 LEVELS = 4
 SHORT = BROAD >> (LEVELS - 1)
@@ -34,10 +38,11 @@ PARTS = BROAD // SHORT
 FALLS = 2.0 ** (COLUMN_NODES - 1)
 #: the last coefficient but one may be so many times what is allowed: the next ones fall at least as fast as that
 BEFORE_LAST = 64.0
-#: of a plan: the level; the first column of the part, how many columns it has; whether every row is priced; rows and
-#: columns of the next candidates; how many prices have been computed
-LEVEL, BEGIN, SIZE, EVERY_ROW, ROWS, COLUMNS, PRICED = range(7)
-PLAN = 7
+#: of a plan: the level; the first column of the part, how many columns it has; which number of rows is tried (of
+#: ROW_NODES, or ALL_ROWS); rows and columns of the next candidates; how many prices have been computed; which number of
+#: rows is tried first, as fewer have not been enough in the tile; the part whose columns' shares are in the buffer
+LEVEL, BEGIN, SIZE, TRIED_ROWS, ROWS, COLUMNS, PRICED, FIRST_ROWS, SHARES = range(9)
+PLAN = 9
 #: the level of a part that has its prices
 DONE = -1
 
@@ -48,7 +53,9 @@ def _extremes(size: int, count: int) -> list[int]:
 
 
 #: the nodes of a tile's rows, and of its columns at each level
-ROW_NODE: IndexArray = np.array(_extremes(TALL, ROW_NODES), dtype=np.int64)
+ROW_NODE: IndexArray = np.zeros((ALL_ROWS, MOST_ROW_NODES), dtype=np.int64)
+for _k, _count in enumerate(ROW_NODES.tolist()):
+    ROW_NODE[_k, :_count] = _extremes(TALL, _count)
 COLUMN_NODE: IndexArray = np.array([_extremes(BROAD >> level, COLUMN_NODES) for level in range(LEVELS)], dtype=np.int64)
 
 
@@ -90,7 +97,7 @@ def smoothness(
     columns, of each level for a part that begins there.
     """
     first, second = (np.asarray(each, dtype=np.float64) for each in chosen)
-    by_rows = smooth_parts(grids[0], first, TALL, ROW_NODE)
+    by_rows = smooth_parts(grids[0], first, TALL, ROW_NODE[0, : ROW_NODES[0]])
     by_columns = np.zeros((LEVELS, len(second) // SHORT), dtype=np.int64)
     for level in range(LEVELS):
         size = BROAD >> level
@@ -134,10 +141,12 @@ def begin_tile(error, scratch):
 def begin_part(level, at, scratch):
     """Begin a part of a tile, which has so many columns as the level says: the others have their prices.
 
-    level, at: its level, and the number of its first column. scratch: of `make_scratch`; plan and level are set.
+    level, at: its level, and the number of its first column. scratch: of `make_scratch`; plan and level are set,
+      but for what the plan knows of parts before.
     """
     plan, own = scratch[:2]
-    plan[:] = 0
+    plan[:FIRST_ROWS] = 0
+    plan[TRIED_ROWS] = plan[FIRST_ROWS]
     plan[LEVEL] = level
     own[:] = DONE
     _put_off(own, at // SHORT, BROAD >> level, level)
@@ -176,21 +185,18 @@ def next_candidates(grids, i, j, scratch):
             if level[smallest] == plan[LEVEL]:
                 _put_off(level, smallest, size, plan[LEVEL] + 1)
             plan[BEGIN] += size
-            plan[EVERY_ROW] = 0
+            plan[TRIED_ROWS] = plan[FIRST_ROWS]
             continue
         plan[SIZE] = size
         plan[COLUMNS] = COLUMN_NODES
         for k in range(COLUMN_NODES):
             columns[k] = at + COLUMN_NODE[plan[LEVEL], k]
-        if height == TALL and grids[2][i] != 0 and plan[EVERY_ROW] == 0:
-            plan[ROWS] = ROW_NODES
-            for k in range(ROW_NODES):
-                rows[k] = ROW_NODE[k]
-        else:
-            plan[EVERY_ROW] = 1
-            plan[ROWS] = height
-            for k in range(height):
-                rows[k] = k
+        if height != TALL or grids[2][i] == 0:
+            plan[TRIED_ROWS] = ALL_ROWS
+        tried = plan[TRIED_ROWS]
+        plan[ROWS] = height if tried == ALL_ROWS else ROW_NODES[tried]
+        for k in range(plan[ROWS]):
+            rows[k] = k if tried == ALL_ROWS else ROW_NODE[tried, k]
         return True
     if plan[LEVEL] > LEVELS:
         return False
@@ -227,6 +233,22 @@ def number_candidates(i, j, scratch):
         for b in range(wide):
             index[0, a * wide + b] = i * TALL + rows[a]
             index[1, a * wide + b] = j * BROAD + columns[b]
+    return plan[ROWS] * wide
+
+
+@kernel
+def place_candidates(scratch, places):
+    """The places in the tile of the candidates that `next_candidates` has told.
+
+    scratch: of `make_scratch`. places (PLACES,): set, row by row.
+
+    Returns how many there are.
+    """
+    plan, _, rows, columns, _, _, _ = scratch
+    wide = plan[COLUMNS]
+    for a in range(plan[ROWS]):
+        for b in range(wide):
+            places[a * wide + b] = rows[a] * BROAD + columns[b]
     return plan[ROWS] * wide
 
 
@@ -271,21 +293,25 @@ def take_prices(grids, i, j, error, scratch, price):
             more = max(1.0, min(math.log(worst / error) / math.log(FALLS), 1.0 * LEVELS))
         _put_off(level, smallest, size, min(plan[LEVEL] + math.ceil(more), LEVELS))
         return
-    if plan[EVERY_ROW] == 0:
-        row_node = np.empty(ROW_NODES)
-        row_weight = np.empty(ROW_NODES)
-        fill_weights(grids[0], i * TALL, np.int64(TALL), ROW_NODE, row_node, row_weight)
+    if plan[TRIED_ROWS] != ALL_ROWS:
+        row_node = np.empty(height)
+        row_weight = np.empty(height)
+        fill_weights(grids[0], i * TALL, np.int64(TALL), ROW_NODE[plan[TRIED_ROWS]], row_node, row_weight)
         for b in range(wide):
             worst = _worse(worst, _tail(found, b, wide, row_node, row_weight))
         if not worst <= error:
-            plan[EVERY_ROW] = 1
+            plan[TRIED_ROWS] += 1
+            plan[FIRST_ROWS] = max(plan[FIRST_ROWS], plan[TRIED_ROWS])
             return
         _along_rows(grids[0], i, row_node, row_weight, found, buffer[COLUMN_NODES:])
     else:
         for a in range(height):
             for b in range(COLUMN_NODES):
                 buffer[COLUMN_NODES + a, b] = found[a * wide + b]
-    _along_columns(grids[1], j * BROAD + plan[BEGIN], size, node, weight, buffer)
+    first = j * BROAD + plan[BEGIN]
+    if plan[SHARES] != 1 + first * LEVELS + plan[LEVEL]:
+        plan[SHARES] = 1 + first * LEVELS + plan[LEVEL]
+        _along_columns(grids[1], first, size, node, weight, buffer)
     _spread(buffer, extent(grids, i, j)[0], plan[BEGIN], size, price)
     _put_off(level, smallest, size, DONE)
 
@@ -297,7 +323,7 @@ def fill_weights(numbers, first, size, chosen, node, weight):
     In:
       numbers (n,): of the points of the grid.
       first, size: the part's first point, and how many it has.
-      chosen: its nodes.
+      chosen: its nodes, and perhaps more behind them.
     Out:
       node, weight: of each.
     """
@@ -368,16 +394,16 @@ def _along_rows(numbers, i, node, weight, found, out):
     """Values of all rows of a tile at the nodes of the columns.
 
     numbers (n,), i: of the points of the first grid, and the strip.
-    node, weight (ROW_NODES,): of `fill_weights`. found (ROW_NODES * COLUMN_NODES or more,): values at the nodes.
+    node, weight (nodes,): of `fill_weights`. found (nodes * COLUMN_NODES or more,): values at the nodes.
     out (TALL, COLUMN_NODES or more): set.
     """
-    share = np.empty(ROW_NODES)
+    share = np.empty(node.shape[0])
     first = i * TALL
     for a in range(TALL):
         _shares(numbers, first + a, numbers[first], numbers[first + TALL - 1], node, weight, share)
         for b in range(COLUMN_NODES):
             value = 0.0
-            for k in range(ROW_NODES):
+            for k in range(node.shape[0]):
                 value += share[k] * found[k * COLUMN_NODES + b]
             out[a, b] = value
 

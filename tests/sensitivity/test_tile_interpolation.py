@@ -28,6 +28,8 @@ from mdstopo.sensitivity.tile_interpolation import (
 from tests.space.in_python import in_python  # noqa: F401  (a fixture)
 
 ERROR = 1e-12
+#: rows of a tile that are tried first
+FEWEST = int(ROW_NODES[0])
 
 
 def line(begin, end, count):
@@ -77,7 +79,7 @@ def assert_equal(found, wanted, error=ERROR):
 @pytest.mark.usefixtures("in_python")
 def test_a_smooth_tile_follows_from_a_few_of_its_candidates():
     found, computed = tile(dense(), distance)
-    assert computed == ROW_NODES * COLUMN_NODES
+    assert computed == FEWEST * COLUMN_NODES
     assert_equal(found, every(dense(), distance))
 
 
@@ -94,14 +96,22 @@ def test_a_tile_that_is_large_is_halved_or_computed(reach):
     grids = line([0, 0], [reach / 8, 0], TALL), line([0, 1], [reach, 1], BROAD)
     found, computed = tile(grids, distance)
     assert_equal(found, every(grids, distance))
-    assert ROW_NODES * COLUMN_NODES < computed <= PLACES + 2 * LEVELS * TALL * COLUMN_NODES
+    assert FEWEST * COLUMN_NODES < computed <= PLACES + 2 * LEVELS * TALL * COLUMN_NODES
 
 
 @pytest.mark.usefixtures("in_python")
 def test_rows_that_are_far_apart_are_computed_at_the_nodes_of_columns():
     grids = line([-1, 0], [1, 0], TALL), line([0, 1], [0.02, 1.01], BROAD)
     found, computed = tile(grids, distance)
-    assert computed == (ROW_NODES + TALL) * COLUMN_NODES
+    assert computed == (int(ROW_NODES.sum()) + TALL) * COLUMN_NODES
+    assert_equal(found, every(grids, distance))
+
+
+@pytest.mark.usefixtures("in_python")
+def test_rows_that_are_somewhat_apart_follow_from_more_of_them():
+    grids = line([0, 0], [0.15, 0], TALL), line([0, 1], [0.02, 1.01], BROAD)
+    found, computed = tile(grids, distance)
+    assert computed == int(ROW_NODES.sum()) * COLUMN_NODES
     assert_equal(found, every(grids, distance))
 
 
@@ -128,7 +138,7 @@ def test_tiles_at_the_edge_of_a_grid_have_all_their_candidates(rows, columns):
     # 100 are 64, 32, and four that are priced one by one
     parts = [BROAD >> level for level in range(LEVELS) if columns & (BROAD >> level)]
     left = -(-(columns - sum(parts)) // WIDE) * WIDE
-    assert computed == (ROW_NODES if rows == TALL else rows) * COLUMN_NODES * len(parts) + rows * left
+    assert computed == (FEWEST if rows == TALL else rows) * COLUMN_NODES * len(parts) + rows * left
 
 
 @pytest.mark.usefixtures("in_python")
@@ -136,7 +146,7 @@ def test_grids_with_corners_and_arcs_and_parts_of_grids():
     t = np.linspace(0, 0.05, BROAD)
     arc = 1.5 * np.stack([np.cos(t), np.sin(t)], axis=1)
     corner = np.concatenate([line([1, 1], [1, 1.02], 90), line([1.0005, 1.02], [1.02, 1.02], 38)])
-    for second, most in ((arc, ROW_NODES * COLUMN_NODES), (corner, PLACES // 3)):
+    for second, most in ((arc, FEWEST * COLUMN_NODES), (corner, PLACES // 3)):
         found, computed = tile((dense()[0], second), distance)
         assert_equal(found, every((dense()[0], second), distance))
         assert computed <= most
@@ -144,20 +154,22 @@ def test_grids_with_corners_and_arcs_and_parts_of_grids():
     whole = line([0, 0], [0.01, 0.005], 37), line([0.2, 1], [0.22, 1.01], 200)
     grids = whole[0][chosen[0]], whole[1][chosen[1]]
     found, computed = tile(grids, distance, chosen)
-    assert computed == ROW_NODES * COLUMN_NODES
+    assert computed == FEWEST * COLUMN_NODES
     assert_equal(found, every(grids, distance))
 
 
 def test_parts_are_smooth_whose_places_are_polynomials():
     rng = np.random.default_rng(2)
     straight, numbers = line([3, 4], [5, -2], 3 * TALL + 5), np.arange(3 * TALL + 5)
-    assert smooth_parts(straight, numbers, TALL, ROW_NODE).tolist() == [1, 1, 1]
+    assert smooth_parts(straight, numbers, TALL, ROW_NODE[0, :FEWEST]).tolist() == [1, 1, 1]
     bent = straight.copy()
     bent[TALL + 3 :, 0] += 1e-9
-    assert smooth_parts(bent, numbers, TALL, ROW_NODE).tolist() == [1, 0, 1]
+    assert smooth_parts(bent, numbers, TALL, ROW_NODE[0, :FEWEST]).tolist() == [1, 0, 1]
     spread = np.sort(rng.choice(10**6, 3 * TALL, replace=False))
-    assert smooth_parts(straight[0] + spread[:, None] * [1e-6, 2e-6], spread, TALL, ROW_NODE).all()
-    assert not smooth_parts(straight[0] + spread[:, None] * [1e-6, 2e-6], np.arange(3 * TALL), TALL, ROW_NODE).any()
+    assert smooth_parts(straight[0] + spread[:, None] * [1e-6, 2e-6], spread, TALL, ROW_NODE[0, :FEWEST]).all()
+    assert not smooth_parts(
+        straight[0] + spread[:, None] * [1e-6, 2e-6], np.arange(3 * TALL), TALL, ROW_NODE[0, :FEWEST]
+    ).any()
     assert not smooth_parts(rng.normal(size=(200, 3)), np.arange(200), BROAD, COLUMN_NODE[0]).any()
 
 

@@ -16,6 +16,10 @@ reach r that neither |w| nor |h| exceeds, the rate is
 What is linear in the s of both points is largest where these are 1 or -1. A bulge b adds b to the length, and
 b (|v| / L + |S'|) to the rate. So elongations and rates have bounds whose width beyond the linear part falls with the
 square of the part. Bounds of a margin follow where it is the least of linear functions: at the corners.
+
+Of a single member the s of its points are known, so that its own bounds are as narrow as the remainder
+(`sorted_by_lines`). For these the first points are on two lines: where they are a row of a surface, a tile may have the
+end of one row and the beginning of the next.
 """
 
 import math
@@ -64,6 +68,18 @@ PART_NUMBERS = 6
 FREE, FREE_SECOND, FREE_FIRST, FREE_MORE, REACH, BULGE = range(PART_NUMBERS)
 #: bounds of elongations and rates
 LOW, HIGH, SLOWEST, FASTEST = range(4)
+#: elongation and rate as linear functions of the places of both points on their lines: in the middle, and by how much
+#: they change along the second and the first line; how far the elongation may be below and above, and the rate from it
+LINEAR_NUMBERS = 9
+X, X_SECOND, X_FIRST, X_LESS, X_MORE, V, V_SECOND, V_FIRST, V_OFF = range(LINEAR_NUMBERS)
+#: lines of a tile's first points by which single members are told; level of the largest parts for these, and where
+#: they begin among the parts of all levels
+ROW_LINES = 2
+LINED_LEVEL = 2
+LINED_FIRST = 2**LINED_LEVEL - 1
+#: parts of the levels from that one to the last that has lists, and how many there are of the last one
+LINED_PARTS = 2**LEVELS - 2**LINED_LEVEL
+LINED_AT_ONCE = 2 ** (LEVELS - 1)
 #: bounds are so much wider, relative to lengths and speeds, than they need be: no member is at a switch by rounding
 WIDER = 1e-11
 #: what may be known of the modes of all members of a part in a step: nothing; a mode of which none leaves (0 and more);
@@ -74,12 +90,20 @@ LEAVES = -2
 
 @kernel
 def make_spans(axes):
-    """Lines (parts and rows, LOCAL or STATED, MIDDLE or HALF, axes), numbers of parts, vectors, bounds: scratch."""
+    """Lines (parts and rows, LOCAL or STATED, MIDDLE or HALF, axes), numbers of parts, vectors, bounds, linear
+    functions; then, for single members, lines of rows, numbers of parts with these, where rows are on their lines, and
+    columns on those of the parts of two levels, and the first row of the second line: scratch."""
     return (
         np.zeros((BOUND_PARTS + 1, 2, 2, axes)),
         np.zeros((BOUND_PARTS, PART_NUMBERS)),
         np.zeros((4, axes)),
         np.zeros(4),
+        np.zeros(LINEAR_NUMBERS),
+        np.zeros((ROW_LINES, 2, 2, axes)),
+        np.zeros((ROW_LINES, LINED_PARTS, PART_NUMBERS)),
+        np.zeros(TALL),
+        np.zeros((LEVELS - LINED_LEVEL, BROAD)),
+        np.zeros(1, np.int64),
     )
 
 
@@ -93,7 +117,7 @@ def fill_spans(candidates, k, i, j, spans):
     Out:
       spans: of `make_spans`.
     """
-    line, number, w, _ = spans
+    line, number, w, _, _, row_line, lined_number, row_place, column_place, split = spans
     scene = candidates.run[k, SCENE]
     grids = (candidates.first[scene], candidates.first_stated[scene])
     others = (candidates.second[scene], candidates.second_stated[scene])
@@ -102,6 +126,16 @@ def fill_spans(candidates, k, i, j, spans):
     bulge = 0.0
     for which in range(2):
         bulge = max(bulge, _fill_line(grids[which], i * TALL, height, line[ROWS_OF_ALL, which]))
+    split[0] = _second_line(grids[LOCAL], i * TALL, height)
+    beside = np.zeros(ROW_LINES)
+    for n in range(ROW_LINES):
+        begin, behind = rows_of_line(n, height, split)
+        if begin == behind:
+            continue
+        for which in range(2):
+            off = _fill_line(grids[which], i * TALL + begin, behind - begin, row_line[n, which])
+            beside[n] = max(beside[n], off)
+        _fill_places(grids[LOCAL], i * TALL + begin, row_line[n, LOCAL], row_place[begin:behind])
     for level in range(BOUND_LEVELS):
         size = BROAD >> level
         for at in range(1 << level):
@@ -112,6 +146,62 @@ def fill_spans(candidates, k, i, j, spans):
             for which in range(2):
                 off = max(off, _fill_line(others[which], j * BROAD + at * size, size, own[which]))
             _fill_part(candidates.rest[k], own, line[ROWS_OF_ALL], bulge + off, number[(1 << level) - 1 + at], w)
+            if level < LINED_LEVEL or level >= LEVELS:
+                continue
+            part = (1 << level) - 1 + at - LINED_FIRST
+            for n in range(ROW_LINES):
+                _fill_part(candidates.rest[k], own, row_line[n], beside[n] + off, lined_number[n, part], w)
+            place = column_place[level - LINED_LEVEL, at * size : (at + 1) * size]
+            _fill_places(others[LOCAL], j * BROAD + at * size, own[LOCAL], place)
+
+
+@part
+def rows_of_line(n, height, split):
+    """The first row of line n, and the one behind its last.
+
+    n, height: the line, and rows of the tile. split (1,): of `make_spans`.
+    """
+    if n == 0:
+        return np.int64(0), np.int64(split[0])
+    return np.int64(split[0]), np.int64(height)
+
+
+@kernel
+def _second_line(points, first, size):
+    """At which of some points a second line begins: behind the longest way from one to the next where it is twice the
+    shortest, else in the middle.
+
+    points (axes, n), first, size: as of `_fill_line`.
+    """
+    longest = 0.0
+    shortest = np.inf
+    at = np.int64((size + 1) // 2)
+    begins = at
+    for n in range(1, size):
+        square = 0.0
+        for d in range(points.shape[0]):
+            square += (points[d, first + n] - points[d, first + n - 1]) ** 2
+        if square > longest:
+            longest = square
+            begins = np.int64(n)
+        shortest = min(shortest, square)
+    return begins if longest > 4.0 * shortest else at
+
+
+@kernel
+def _fill_places(points, first, line, place):
+    """Where some points are on their line, from -1 to 1.
+
+    points (axes, n), first: as of `_fill_line`. line (2, axes): their line. place (size,): set.
+    """
+    square = 0.0
+    for d in range(points.shape[0]):
+        square += line[HALF, d] * line[HALF, d]
+    for n in range(place.shape[0]):
+        along = 0.0
+        for d in range(points.shape[0]):
+            along += (points[d, first + n] - line[MIDDLE, d]) * line[HALF, d]
+        place[n] = min(max(along / square, -1.0), 1.0) if square > 0.0 else 0.0
 
 
 @kernel
@@ -189,17 +279,38 @@ def _fill_part(rest, line, rows, bulge, number, w):
 
 
 @part
-def _fill_bounds(axes, frame, at_row, line, rows, number, w, bound):
+def _fill_bounds(axes, frame, at_row, line, rows, number, w, linear, bound):
     """Bounds of elongations (m) and rates (m/s) of all members of a part at a relative pose.
+
+    axes, frame, at_row, line, rows, number: as of `fill_linear`.
+    bound (4,): set. w (4, axes), linear (LINEAR_NUMBERS,): scratch.
+
+    Returns whether there are any: not where ends may meet.
+    """
+    if not fill_linear(axes, frame, at_row, line, rows, number, w, linear):
+        return False
+    spread = abs(linear[X_SECOND]) + abs(linear[X_FIRST])
+    bound[LOW] = linear[X] - spread - linear[X_LESS]
+    bound[HIGH] = linear[X] + spread + linear[X_MORE]
+    spread = abs(linear[V_SECOND]) + abs(linear[V_FIRST]) + linear[V_OFF]
+    bound[SLOWEST] = linear[V] - spread
+    bound[FASTEST] = linear[V] + spread
+    return True
+
+
+@part
+def fill_linear(axes, frame, at_row, line, rows, number, w, linear):
+    """Elongations (m) and rates (m/s) of all members of a part at a relative pose, as linear functions of where their
+    points are on the lines, and how far they may be from these.
 
     Constant:
       axes: 2 in a plane, 3 in space.
     In:
       frame (any, n_frame), at_row: how ends move, of `priced_candidates.PricedCandidates`, and in which row.
-      line, rows (2, 2, axes): lines of the part's second points and of the tile's first.
+      line, rows (2, 2, axes): lines of the part's second points and of the first.
       number (PART_NUMBERS,): of the part.
     Out:
-      bound (4,): set.
+      linear (LINEAR_NUMBERS,): set.
       w (4, axes): scratch.
 
     Returns whether there are any: not where ends may meet.
@@ -257,18 +368,19 @@ def _fill_bounds(axes, frame, at_row, line, rows, number, w, bound):
     rate *= inverse
     bulge = number[BULGE]
     across = (second_square - second * second) + (first_square - first * first) + bulge * bulge
-    spread = abs(second - number[FREE_SECOND]) + abs(first - number[FREE_FIRST]) + 2.0 * bulge
-    spread += WIDER * (1.0 + length)
-    x = length - number[FREE]
-    bound[LOW] = x - spread - number[FREE_MORE]
-    bound[HIGH] = x + spread + 1.5 * across / shortest
+    off = 2.0 * bulge + WIDER * (1.0 + length)
+    linear[X] = length - number[FREE]
+    linear[X_SECOND] = second - number[FREE_SECOND]
+    linear[X_FIRST] = number[FREE_FIRST] - first
+    linear[X_LESS] = off + number[FREE_MORE]
+    linear[X_MORE] = off + 1.5 * across / shortest
     turning = frame[at_row, spin_at + axes * axes]
     near = reach / shortest
-    spread = abs(swing + second_rate - second * rate) * inverse + abs(first_rate - first * rate) * inverse
-    spread += 0.6 * near * near * speed + near * turning * reach + bulge * (speed * inverse + turning)
-    spread += WIDER * (1.0 + speed)
-    bound[SLOWEST] = rate - spread
-    bound[FASTEST] = rate + spread
+    linear[V] = rate
+    linear[V_SECOND] = (swing + second_rate - second * rate) * inverse
+    linear[V_FIRST] = (first * rate - first_rate) * inverse
+    off = 0.6 * near * near * speed + near * turning * reach + bulge * (speed * inverse + turning)
+    linear[V_OFF] = off + WIDER * (1.0 + speed)
     return True
 
 
@@ -336,7 +448,7 @@ def modes_at_nodes(model, candidates, k, s, which, spans, mode):
     code = candidates.run[k, CODE]
     p = candidates.law[k]
     curves = model.curves
-    line, number, w, bound = spans
+    line, number, w, bound, linear = spans[:5]
     rest = number[which, FREE]
     axes = freedoms(model) - rotations(model)
     for m in range(NODES):
@@ -344,7 +456,7 @@ def modes_at_nodes(model, candidates, k, s, which, spans, mode):
         o = candidates.step[s, FIRST_NODE] + m
         t = candidates.step_time[s, 0] + NODE[m] * candidates.step_time[s, 1]
         rows = line[ROWS_OF_ALL]
-        if not _fill_bounds(axes, candidates.node_frame, o, line[which], rows, number[which], w, bound):
+        if not _fill_bounds(axes, candidates.node_frame, o, line[which], rows, number[which], w, linear, bound):
             continue
         x = 0.5 * (bound[LOW] + bound[HIGH])
         rate = 0.5 * (bound[SLOWEST] + bound[FASTEST])
@@ -373,7 +485,7 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
     code = run[CODE]
     p = candidates.law[k]
     curves = model.curves
-    line, number, w, bound = spans
+    line, number, w, bound, linear = spans[:5]
     rows = line[ROWS_OF_ALL]
     line = line[which]
     number = number[which]
@@ -395,7 +507,7 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
     sign = 0.0
     for m in range(1 if at_state else NODES):
         t = begin + NODE[m] * long
-        if not _fill_bounds(axes, frame, first + m, line, rows, number, w, bound):
+        if not _fill_bounds(axes, frame, first + m, line, rows, number, w, linear, bound):
             return UNSURE, UNSURE
         before = sign
         sign = 1.0 if bound[SLOWEST] > 0.0 else -1.0 if bound[FASTEST] < 0.0 else 0.0

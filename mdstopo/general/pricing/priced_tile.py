@@ -11,7 +11,7 @@ from mdstopo.general.pricing.sorted_members import make_sorting
 from mdstopo.general.pricing.switching_prices import make_following
 from mdstopo.general.pricing.switching_together import make_switching
 from mdstopo.mechanics.kinematics.kinematics_interface import WORKS
-from mdstopo.sensitivity.tile_interpolation import LEVELS, PARTS, PLACES, extent
+from mdstopo.sensitivity.tile_interpolation import LEVELS, PARTS, PLACES, begin_tile, extent
 
 #: parts of a tile of all levels that have lists, of which those of a level begin at 2^level - 1
 LISTED_PARTS = 2**LEVELS - 1
@@ -91,6 +91,7 @@ def begin_pricing(model, candidates, k, place, scratch, lists, price):
     """
     grids, i, j, error = place
     height, width = extent(grids, i, j)
+    begin_tile(error, scratch)
     lists.count[:] = 0
     lists.modes[:] = 0
     lists.sets[:] = 0.0

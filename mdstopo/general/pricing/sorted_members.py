@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.vector import lanes, larger, load, negative, zero
+from mdstopo.compiler.vector import WIDE, lanes, larger, load, negative, zero
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODE, NODES
 from mdstopo.general.pricing.certain_modes import NARROW, UNSURE
+from mdstopo.general.pricing.loaded_members import take_members
 from mdstopo.general.pricing.switching_prices import CLOSE, range_of
 from mdstopo.general.pricing.switching_together import is_quick
 from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, RATE, WORKS, member_works
@@ -175,6 +176,110 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
                 kind[at] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
 
 
+@kernel
+def sort_places(model, candidates, k, s, places, count, modes, sorting):
+    """Sort some members of a tile by a law that does not remember, of which `is_quick`.
+
+    In:
+      model: with the members of the tile (`load_all`).
+      candidates, k, s: as of `sort_members`.
+      places (count or more,), count: which members, and how many.
+      modes: how many modes in which members may stay are tried.
+    In place:
+      sorting: a `Sorting`, with these modes and the tangents of their margins in a range that all members are in;
+        classes of the members are set, and added to those that there are.
+    """
+    kind, classes, mode, works, tried = sorting.kind, sorting.classes, sorting.mode, sorting.works, sorting.tried
+    p = candidates.law[k]
+    code = candidates.run[k, CODE]
+    free = model.member[MEMBER_FREE_LENGTH]
+    inside = np.zeros((TRIED, NODES), np.int64)
+    outside = np.zeros((TRIED, NODES), np.int64)
+    mode[:] = UNSURE
+    for at in range(0, count, MANY):
+        wide = min(MANY, count - at)
+        take_members(model, places[at : at + wide], wide, (wide + WIDE - 1) // WIDE * WIDE)
+        for m in range(NODES):
+            o = candidates.step[s, FIRST_NODE] + m
+            member_works(model, np.int64(0), wide, candidates.node_pose[o], candidates.node_change[o], works[m])
+        for i in range(0, wide, lanes()):
+            left = (1 << min(wide - i, lanes())) - 1
+            _fill_masks(modes, i, sorting, inside, outside)
+            for old in range(modes):
+                for new in range(modes):
+                    bits = _that_go(inside[old], outside[old], inside[new], old == new) & left
+                    if bits == 0:
+                        continue
+                    left &= ~bits
+                    own = join_class(tried[old], tried[new], _how_many(bits), classes)
+                    for lane in range(lanes()):
+                        if (bits >> lane) & 1 == 1:
+                            kind[places[at + i + lane]] = own
+            for lane in range(lanes() if left != 0 else 0):
+                if (left >> lane) & 1 == 1:
+                    old, new = _modes_of(
+                        code, p, model.curves, free[i + lane], candidates.step_time[s], np.int64(UNSURE), mode, works,
+                        i + lane,
+                    )  # fmt: skip
+                    own = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
+                    kind[places[at + i + lane]] = own
+
+
+@part
+def _fill_masks(modes, i, sorting, inside, outside):
+    """Which members of a vector of them are in a mode at a node, and which are out of it, a bit for each.
+
+    In:
+      modes, i: how many modes are tried, and the first member.
+      sorting: a `Sorting`.
+    Out:
+      inside, outside (TRIED, NODES): set; neither where rounding may decide.
+    """
+    works, tangent = sorting.works, sorting.tangent
+    for m in range(NODES):
+        x = load(works[m, ELONGATION], i)
+        rate = load(works[m, RATE], i)
+        for n in range(modes):
+            over = zero() - np.inf
+            for corner in range(CORNERS):
+                own = tangent[n, corner]
+                value = own[BY_ELONGATION] * x + own[BY_RATE] * rate + own[AT_ZERO]
+                over = larger(over, zero() - value)
+            inside[n, m] = ~negative(zero() - over - (CLOSE if m == 0 else SURE))
+            outside[n, m] = negative(zero() - over + SURE)
+
+
+@part
+def _that_go(inside, outside, other, alike):
+    """A bit for each member that begins in a mode and ends in another, without a third one between.
+
+    inside, outside (NODES,): of the mode in which they begin, of `_fill_masks`; other (NODES,): of the one in which
+    they end, `inside`. alike: whether this is the same one.
+    """
+    found = np.int64(0)
+    before = inside[0]
+    if alike:
+        for m in range(1, NODES):
+            before &= inside[m]
+        return before
+    for m in range(1, NODES):
+        behind = before & outside[m]
+        for n in range(m, NODES):
+            behind &= other[n]
+        found |= behind
+        before &= inside[m]
+    return found
+
+
+@part
+def _how_many(bits):
+    """How many bits of a vector's lanes are set."""
+    count = np.int64(0)
+    for lane in range(lanes()):
+        count += (bits >> lane) & 1
+    return count
+
+
 @part
 def _place(first, i):
     """The place in the tile of member i of columns from the first one on."""
@@ -216,6 +321,21 @@ def _fill_tried(code, p, curves, t, first, size, known, begin, sorting):
         if new:
             tried[count] = now
             count += 1
+    fill_tangents(code, p, curves, t, box, count, tried, tangent)
+    return count
+
+
+@part
+def fill_tangents(code, p, curves, t, box, count, tried, tangent):
+    """Tangents of the margins of modes at the corners of a range of elongations and rates.
+
+    In:
+      code, p (8,), curves, t: as of `_fill_tried`.
+      box (4,): the least and the largest elongation (m), and the least and the largest rate (m/s).
+      count, tried (count or more,): the modes.
+    Out:
+      tangent (count or more, CORNERS, TANGENT_NUMBERS): set.
+    """
     for n in range(count):
         for corner in range(CORNERS):
             x = box[corner // 2]
@@ -226,7 +346,6 @@ def _fill_tried(code, p, curves, t, first, size, known, begin, sorting):
             )
             tangent[n, corner, BY_ELONGATION] = by_x
             tangent[n, corner, BY_RATE] = by_rate
-    return count
 
 
 @part

@@ -12,8 +12,9 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import WIDE
 from mdstopo.general.model.priced_candidates import CODE, FIRST_STAGE, KIND, LAST_STAGE, MOVES, WHOLE
 from mdstopo.general.pricing.certain_modes import BOUND_LEVELS, NARROW, UNSURE, modes_at_nodes
-from mdstopo.general.pricing.loaded_members import add_states, load_all, load_members, take_members
+from mdstopo.general.pricing.loaded_members import add_states, load_all, take_members
 from mdstopo.general.pricing.priced_tile import LOADED
+from mdstopo.general.pricing.sorted_by_lines import sort_by_lines
 from mdstopo.general.pricing.sorted_members import (
     CLASSES,
     COUNT,
@@ -23,6 +24,7 @@ from mdstopo.general.pricing.sorted_members import (
     join_class,
     modes_of_all,
     sort_members,
+    sort_places,
 )
 from mdstopo.general.pricing.switching_prices import ROW, price_step
 from mdstopo.general.pricing.switching_together import SUM, TOGETHER, is_quick, price_switched
@@ -36,7 +38,7 @@ from mdstopo.sensitivity.tile_interpolation import (
     SHORT,
     begin_part,
     next_candidates,
-    number_candidates,
+    place_candidates,
     take_prices,
 )
 
@@ -82,10 +84,15 @@ def price_part(tile, s, level, first, size, smooth, begun):
     to = np.int64(0) if candidates.step[s, KIND] == WHOLE else np.int64(1)
     done = 0.0
     for c in range(CLASSES):
+        if classes[c, COUNT] == 0:
+            continue
         stays = classes[c, FROM] == classes[c, TO]
-        if stays and smooth and classes[c, COUNT] > FEW and not law_is_idle(code, classes[c, FROM]):
+        idle = stays and law_is_idle(code, classes[c, FROM])
+        if stays and smooth and classes[c, COUNT] > FEW and not idle:
             done += _price_by_few(tile, s, level, first, c)
-        if classes[c, COUNT] > 0 and (stays or is_quick(code, candidates.law[k], model.curves)):
+        if (idle or classes[c, COUNT] == 0) and not law_remembers(code):
+            continue
+        if stays or is_quick(code, candidates.law[k], model.curves):
             done += _price_each(tile, s, first, size, c, to)
         else:
             for m in range(_list_places(tile, c, first, size)):
@@ -115,13 +122,20 @@ def _list_places(tile, c, first, size):
 
 @kernel
 def _sort_part(tile, s, level, first):
-    """Sort the members of a part by a law that does not remember: those of its halves, and so on, by bounds, and where
-    these do not tell member by member.
+    """Sort the members of a part by a law that does not remember: where margins are the least of linear functions by
+    bounds of each, else those of its halves, and so on, by bounds, and where these do not tell member by member.
 
     tile, s, level, first: as of `price_part`. The tile's sorting is filled.
     """
     model, candidates, k, lists, sorting = tile.model, tile.candidates, tile.k, tile.lists, tile.sorting
     height, unsorted = tile.height, sorting.unsorted
+    if is_quick(candidates.run[k, CODE], candidates.law[k], model.curves):
+        tried = sort_by_lines(model, candidates, k, s, level, first, height, tile.spans, sorting)
+        if tried >= 0:
+            count = _list_places(tile, np.int64(UNSORTED), first, BROAD >> level)
+            sort_places(model, candidates, k, s, sorting.places, count, tried, sorting)
+            return
+        sorting.classes[:] = 0
     begin = first // NARROW
     behind = begin + (BROAD >> level) // NARROW
     unsorted[begin:behind] = 1
@@ -151,20 +165,21 @@ def _price_by_few(tile, s, level, first, c):
     """Price the members of a part that stay in a mode from those of few of the part.
 
     tile, s, level, first: as of `price_part`.
-    c: the class. Members that have their prices are PAID then.
+    c: the class. Members that have their prices are PAID then, and in no class.
 
     Returns how many prices were computed.
     """
     model, candidates, k, i, j = tile.model, tile.candidates, tile.k, tile.i, tile.j
     scratch, sorting, found = tile.scratch, tile.sorting, tile.lists.found
-    plan, part_level, _, _, index, values, _ = scratch
+    plan, part_level, _, _, _, values, _ = scratch
+    places, classes = sorting.places, sorting.classes
     step = candidates.step[s]
-    mode = sorting.classes[c, FROM]
+    mode = classes[c, FROM]
     found[1, 0] = 0.0
     begin_part(level, first, scratch)
     while next_candidates(tile.grids, i, j, scratch) and plan[LEVEL] < LEVELS:
-        members = number_candidates(i, j, scratch)
-        load_members(model, candidates, k, index, members, np.int64(0))
+        members = place_candidates(scratch, places)
+        take_members(model, places, members, members)
         values[:members] = 0.0
         add_states(
             model, candidates, k, step[FIRST_STAGE], step[LAST_STAGE], members, mode, found[1, :1], tile.lists.works,
@@ -172,10 +187,11 @@ def _price_by_few(tile, s, level, first, c):
         )  # fmt: skip
         take_prices(tile.grids, i, j, tile.error * SHARE_OF_A_CLASS, scratch, found[0])
     for m in range(_list_places(tile, c, first, BROAD >> level)):
-        b = sorting.places[m]
+        b = places[m]
         if part_level[b % BROAD // SHORT] == DONE:
             tile.price[b] += found[0, b]
             sorting.kind[b] = PAID
+            classes[c, COUNT] -= 1
     return 1.0 * plan[PRICED]
 
 
