@@ -51,6 +51,8 @@ from mdstopo.mechanics.laws.law_table import (
 SLACK = 0.03
 #: how near to the ends of a piece of a step it is not worth cutting
 EDGE = 1e-7
+#: how often a member may switch at one time by one of its margins
+AT_ONCE = 3
 #: a margin is watched unless the least control value of its cubic over a step is above this share of what it changes by
 FAR = 0.25
 
@@ -87,6 +89,23 @@ def watch_all(model, segment, watched):
         found += 1
         watched[found] = model.member.shape[1] + j
     watched[0] = found
+
+
+@kernel
+def most_switches(model, member_state, watched):
+    """How often the members and contacts that are watched may switch at one time.
+
+    A leg that begins to act where it has been crushed already goes through all of its modes: open, elastic, crushing,
+    elastic. Of a formula there may be as much to each of its kinks.
+
+    model: the compiled scene.
+    member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+    watched: the list (`room_for_watched`).
+    """
+    total = 0
+    for m in range(1, watched[0] + 1):
+        total += AT_ONCE * margins_of(model, watched[m], int(member_state[MODE, watched[m]]))
+    return total
 
 
 @part
