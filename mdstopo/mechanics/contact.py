@@ -92,6 +92,27 @@ def drag_by_slide(c, slide):
 
 
 @inline
+def contact_margins(c, mode):
+    """How many margins a mode has: on the edge those of contact and of its ends, and with damping that of the force."""
+    if mode in (ABOVE, BESIDE):
+        return 1
+    return 3 if c[1] > 0.0 else 2
+
+
+@inline
+def contact_one_margin(c, which, height, rise, room, mode):
+    """One margin and its slopes by height, rise and room: of height, then of room, then of the normal force."""
+    if mode == ABOVE:
+        return height, 1.0, 0.0, 0.0
+    if which == 0:
+        return -height, -1.0, 0.0, 0.0
+    if which == 1:
+        return room, 0.0, 0.0, 1.0
+    sign = (-1.0 if mode == CLOSED else 1.0) / (c[0] + c[1])
+    return sign * (c[0] * height + c[1] * rise), sign * c[0], sign * c[1], 0.0
+
+
+@inline
 def contact_margin(c, height, rise, room, mode):
     """How far the mode is from its end: a distance in m, or the normal force before it is cut off, divided by k + c."""
     if mode == ABOVE:

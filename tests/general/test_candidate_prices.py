@@ -270,6 +270,15 @@ def test_prices_know_members_that_begin_to_act_at_the_very_instant_of_a_peak():
     assert scene.error <= 1e-8
 
 
+def test_prices_know_on_which_side_of_a_members_own_jump_a_peak_is():
+    """The acceleration is least right in front of the instant at which a built member's damping begins."""
+    law = {
+        "type": "expression", "force": "k*max(x - g, 0) + c*xd*step(x - g)", "free_length": 0.9650148616175049,
+        "parameters": {"k": 500.0, "g": -0.012129066798906987, "c": 3.0},
+    }  # fmt: skip
+    assert Priced(arm(law, **looked(PUSH, "min")), 0.0025).error <= 1e-8
+
+
 def test_time_goes_on_where_a_member_switches_right_behind_another():
     """The response was not a number in the step without length that ended at the second switch."""
     law = {"type": "crush", "stiffness": 900, "force": 40, "side": "tension", "free_length": 0.3, "active_from": 0.1}

@@ -10,11 +10,13 @@ from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.general.dynamics.general_contact import add_contacts
 from mdstopo.general.model.general_model import pack_general, unpack_general
-from mdstopo.mechanics.contact import CLOSED
+from mdstopo.mechanics import contact
+from mdstopo.mechanics.contact import ABOVE, BESIDE, CLIPPED, CLOSED
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size, relative_pose
 from mdstopo.status import Status
 from tests.compiled import compiled
 from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text
+from tests.space.in_python import in_python  # noqa: F401  (a fixture)
 
 G, ANGLE, K = 9.8, 0.4, 2.0e5
 # a block that does not turn, on two feet, on a slope that falls to the right; it begins at its depth at rest
@@ -362,3 +364,20 @@ def test_two_contacts_of_one_name_are_a_mistake():
     row = text[text.index("  - {name") : text.index("solver")]
     with pytest.raises(CaseError, match=r"contacts\[1\]\.name: the name 'c' is given to contacts\[0\] already"):
         read_case(text.replace(row, row + row))
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("damping", [0.0, 40.0])
+def test_the_margin_of_a_contact_is_the_least_of_margins_without_kinks(damping):
+    rng = np.random.default_rng(2)
+    row = np.array([900.0, damping, 0.3, 0.1, *np.zeros(8)])
+    for mode in (ABOVE, BESIDE, CLOSED, CLIPPED):
+        for _ in range(20):
+            here, there = rng.uniform(-1.0, 1.0, (2, 3))
+            places = range(contact.contact_margins(row, mode))
+            one, two = ([contact.contact_one_margin(row, i, *at, mode) for i in places] for at in (here, there))
+            least = min(one)
+            assert least[0] == pytest.approx(contact.contact_margin(row, *here, mode), abs=1e-15)
+            assert least[1:] == pytest.approx(contact.contact_margin_slopes(row, *here, mode), abs=1e-15)
+            for before, after in zip(one, two, strict=True):
+                assert after[0] - before[0] == pytest.approx(before[1:] @ (there - here), abs=1e-14)

@@ -149,6 +149,57 @@ objectives: {F: {response: {member_force: {group: act}}, over_time: max}}
     assert motion.at([reached]).q[0, 1] == pytest.approx(1.47, abs=1e-9)
 
 
+#: a leg at its plateau, which stops a body to rest at t = 1.22e-4 s, and a belt that another body draws taut at 1.32e-4
+STOPPED = """
+format: 1
+time: {end: 4.0e-4}
+bodies:
+  a: {mass: 1, inertia: 1, position: [0, 1], velocity: [0, 0.0274]}
+  b: {mass: 1, inertia: 1, position: [5, 1], velocity: [0, 0.8525]}
+members:
+  leg:
+    from: {body: ground, at: [0, 0]}
+    to: {body: a, at: [0, 1]}
+    law: {type: crush, stiffness: 1.0e+4, force: 223.68, side: tension, free_length: 0.9}
+  belt:
+    from: {body: ground, at: [5, 0]}
+    to: {body: b, at: [5, 1]}
+    law: {type: gap, stiffness: 100, gap: 1.152875e-4}
+loads: [{body: b, force: [0, 269.7]}]
+"""
+
+
+def test_two_members_that_switch_right_behind_each_other_do_so_each_at_its_time():
+    """One by a rate, the other by an elongation, in one step; both were found at one time, behind the second one."""
+    motion = simulate_text(STOPPED, step=4e-4)
+    rest = 0.0274 / 223.68
+    taut = (np.sqrt(0.8525**2 + 2.0 * 269.7 * 1.152875e-4) - 0.8525) / 269.7
+    assert motion.t[1:3] == pytest.approx([rest, taut], abs=1e-12)
+
+
+#: a leg without effect on what is thrown up against it and stops at t = 0.02 s, a little beyond the plateau
+GRAZED = """
+format: 1
+time: {{end: 0.088}}
+gravity: [0, {gravity}]
+bodies: {{stone: {{mass: 1000, inertia: 1, position: [0, {start}], velocity: [0, {speed}]}}}}
+members:
+  leg:
+    from: {{body: ground, at: [0, -1]}}
+    to: {{body: stone, at: [0, {start}]}}
+    law: {{type: crush, stiffness: 1.0e-3, force: 1.0e-5, side: tension, free_length: 1}}
+"""
+
+
+def test_a_plateau_that_is_reached_and_left_within_a_quarter_of_a_step_is_found():
+    """Between two places that a step is searched through, the member comes from where contact would be lost first."""
+    plateau, start, beyond, top = 0.01, 0.001, 5e-6, 0.02
+    gravity = 2.0 * (plateau + beyond - start) / top**2
+    motion = simulate_text(GRAZED.format(gravity=-gravity, start=start, speed=gravity * top), step=0.088)
+    reached = top - np.sqrt(2.0 * beyond / gravity)
+    assert motion.t[1:3] == pytest.approx([reached, top], abs=1e-8)
+
+
 def test_the_moment_of_an_event_takes_few_trials():
     """Under an integral a trial is a step of twelve balances; the first is where the polynomial has the event."""
     evaluator = Evaluator(load("bouncing"))

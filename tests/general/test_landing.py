@@ -5,6 +5,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
+from mdstopo.general.events import locate
 from mdstopo.general.steps import step_inside
 from mdstopo.integrators.runge_kutta_tables import GENERAL, VECTORS, A, B, C, runge_kutta_tables
 from tests.engine.test_runge_kutta import residual
@@ -33,6 +34,40 @@ def test_a_step_that_ends_inside_another_meets_the_conditions_of_order_seven(c):
 def test_at_the_end_it_is_the_whole_step():
     assert np.array_equal(table_inside(1.0)[VECTORS, B, :12], TABLE[VECTORS, B, :12])
     assert not table_inside(1.0)[VECTORS, B, 12:].any()
+
+
+def located(margin, rounding, resolution):
+    """Where between 0 and 1 the trials of `landing.root_inside` find a margin used up, and how many it took."""
+    low, high, side = 0.0, 1.0, 0
+    at_low, at_high = margin(low), margin(high)
+    last, before = (low, at_low), (high, at_high)
+    for tries in range(locate.TRIALS):
+        slope = (last[1] - before[1]) / (last[0] - before[0])
+        foreseen = last[0] - (last[1] + locate.AIM * rounding) / slope if slope < 0.0 and tries > 0 else -1.0
+        middle = locate.next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries)
+        if middle < 0.0:
+            return high, tries
+        before, last = last, (middle, margin(middle))
+        low, high, at_low, at_high, side = locate.narrowed(low, high, at_low, at_high, *last, rounding, side)
+    return high, locate.TRIALS
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("apart", [1e-2, 1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize("steep", [1.0, 1e2, 1e4, 1e6])
+@pytest.mark.parametrize("first", [0.003, 0.3, 0.96])
+def test_the_first_of_two_margins_of_other_units_is_met_to_rounding(apart, steep, first):
+    """A rate in m/s that is used up right before an elongation in m: secants of the least of both go to neither."""
+    rounding, resolution = 8e-15, 1e-13
+
+    def margin(c):
+        later = first + apart
+        return min(steep * (first - c), (later - c) * (1.0 + 0.3 * c))
+
+    found, tries = located(margin, rounding, resolution)
+    assert margin(found) < -rounding
+    assert 0.0 < found - first <= locate.NEAR * rounding / steep + resolution
+    assert tries < locate.TRIALS
 
 
 #: a trolley on a rail that is thrown against a buffer with friction of its own, and pulled back by a slack rope

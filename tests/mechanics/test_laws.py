@@ -83,6 +83,16 @@ def _slopes(code, p, x, xd, mode, curves):
 
 
 @compiled
+def _margins(code, p, mode, curves):
+    return law_table.law_margins(code, p, mode, curves)
+
+
+@compiled
+def _one_margin(code, p, which, x, xd, mode, curves):
+    return law_table.law_one_margin(code, p, which, x, xd, mode, TIME, curves, REST)
+
+
+@compiled
 def _next(code, p, x, xd, xdd, mode, curves):
     return law_table.law_next(code, p, x, xd, xdd, mode, TIME, curves, REST)
 
@@ -128,6 +138,14 @@ class Kernel:
 
     def slopes(self, x, xd, mode):
         return _slopes(self.code, self.p, float(x), float(xd), mode, self.curves)
+
+    def one_margin(self, which, x, xd, mode):
+        """The margin, and its slopes by x, xd and time."""
+        return _one_margin(self.code, self.p, which, float(x), float(xd), mode, self.curves)
+
+    def margins(self, mode):
+        """How many margins the mode has."""
+        return int(_margins(self.code, self.p, mode, self.curves))
 
     def next(self, x, xd, xdd, mode):
         return _next(self.code, self.p, float(x), float(xd), float(xdd), mode, self.curves)
@@ -596,6 +614,26 @@ def test_a_margin_is_the_lesser_of_at_most_two_linear_functions_and_knows_no_tim
             bent = np.flatnonzero(bend < -rounding)
             # a bend between two samples is in the differences about both
             assert bent.size == 0 or bent[-1] - bent[0] <= 1
+
+
+@every_even
+@many
+@given(seeds)
+def test_the_margin_of_a_mode_is_the_least_of_margins_without_kinks(kind, seed):
+    # what leaves its mode and comes back within a step is found on cubics through values and rates at its ends
+    rng = np.random.default_rng(seed)
+    kernel, modes = with_modes(kind, rng)
+    for mode in modes:
+        x, xd = (np.linspace(*rng.uniform(-9.0, 9.0, 2), 9) for _ in range(2))
+        each = np.array(
+            [[kernel.one_margin(i, *at, mode) for i in range(kernel.margins(mode))] for at in zip(x, xd, strict=True)]
+        )
+        values, by_x, by_xd, by_time = each.transpose(2, 1, 0)
+        rounding = 1e-12 * max(np.abs(values).max(), 1.0)
+        least = [kernel.margin(a, b, mode) for a, b in zip(x, xd, strict=True)]
+        assert values.min(axis=0) == pytest.approx(least, abs=rounding)
+        assert np.abs(np.diff(values) - by_x[:, 1:] * np.diff(x) - by_xd[:, 1:] * np.diff(xd)).max() <= rounding
+        assert not by_time.any()
 
 
 @every_even

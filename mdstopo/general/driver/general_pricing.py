@@ -45,6 +45,9 @@ if TYPE_CHECKING:
 
 #: the highest power of time that virtual changes within a step have, and stages from which on they have it
 HIGHEST, MANY = 3, 8
+#: by how much of the simulated time it is before the end of a step that decides in which mode a candidate is there: a
+#: built one switches there at most by rounding earlier
+SIDE = 1e-8
 
 
 class ScenePricingStates(NamedTuple):
@@ -394,7 +397,8 @@ def steps_of(driver: "GeneralDriver", states: ScenePricingStates, index: IndexAr
             stages = [at + 1, at + 1 + used]
             found.append(((begin, 1, m, 0), [*stages, PART], (begin, c * length), (k, c)))
         key = (begin, 1, m, 1) if used else (begin, 4, m, 0) if inside else (begin + max(c, 0.0) * length, 0, m, 0)
-        found.append((key, [at, at + 1, POINT], (begin + c * length, 0.0), (k, c)))
+        side = -SIDE * (t[count] - t[0]) if c >= 1.0 else 0.0
+        found.append((key, [at, at + 1, POINT], (begin + c * length, side), (k, c)))
     found.sort(key=lambda each: each[0])
     moves = states.change.any(axis=(1, 2)) | (states.energy != 0.0)
     step = [

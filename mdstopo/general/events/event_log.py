@@ -5,7 +5,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import solve_accelerations
 from mdstopo.general.dynamics.members import MODE, SET
-from mdstopo.general.events.events import smallest_margin, switch_any, watch_all
+from mdstopo.general.events.events import most_switches, smallest_margin, switch_any, watch_all
 from mdstopo.general.steps.step_history import (
     GIVEN,
     GRAZES,
@@ -30,7 +30,7 @@ def log_switches(
 ):
     """Switch every member whose margin is used up, one after the other, and note each as an event.
 
-    The loop ends because each member switches at most twice here.
+    The loop ends because members switch a bounded number of times here (`most_switches`).
 
     Constant:
       model: the compiled scene.
@@ -60,9 +60,10 @@ def log_switches(
     rel = np.empty((n_pair, pose_size(model)))
     relative_pose(model, q, v, rel)
     done = 0
+    most = most_switches(model, member_state, watched)
     while True:
         margin, who = smallest_margin(model, t, member_state, rel, watched)
-        if not margin < -noise or done > 2 * member_state.shape[1]:
+        if not margin < -noise or done > most:
             return events
         if events >= history.event.shape[0]:
             return -1

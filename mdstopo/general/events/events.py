@@ -21,7 +21,7 @@ from mdstopo.general.dynamics.general_contact import contact_switch
 from mdstopo.general.dynamics.members import MODE, SCALE, SET
 from mdstopo.general.model.general_model import CODE, COUNT, INERTER, MEMBER_FREE_LENGTH, PAIR, START, STOP
 from mdstopo.general.model.strides import pair_freedoms, place_in_pair
-from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes
+from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margins, contact_one_margin
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     contact_distance,
     contact_seen,
@@ -51,6 +51,8 @@ from mdstopo.mechanics.laws.law_table import (
 SLACK = 0.03
 #: how near to the ends of a piece of a step it is not worth cutting
 EDGE = 1e-7
+#: how often a member may switch at one time by one of its margins
+AT_ONCE = 3
 #: a margin is watched unless the least control value of its cubic over a step is above this share of what it changes by
 FAR = 0.25
 
@@ -90,6 +92,32 @@ def watch_all(model, segment, watched):
 
 
 @kernel
+def most_switches(model, member_state, watched):
+    """How often the members and contacts that are watched may switch at one time.
+
+    A leg that begins to act where it has been crushed already goes through all of its modes: open, elastic, crushing,
+    elastic. Of a formula there may be as much to each of its kinks.
+
+    model: the compiled scene.
+    member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+    watched: the list (`room_for_watched`).
+    """
+    total = 0
+    for m in range(1, watched[0] + 1):
+        total += AT_ONCE * margins_of(model, watched[m], int(member_state[MODE, watched[m]]))
+    return total
+
+
+@part
+def margins_of(model, i, mode):
+    """How many margins member or contact i has in a mode."""
+    if i >= model.member.shape[1]:
+        return contact_margins(model.contact[i - model.member.shape[1]], mode)
+    k = block_of(model, i)
+    return law_margins(model.block[k, CODE], model.law[k], mode, model.curves)
+
+
+@kernel
 def watch_near(model, segment, t, member_state, rel0, rel1, h, watched):
     """Write into `watched` those members and contacts that may leave their mode within a step; the others are too
     far from its end.
@@ -116,7 +144,7 @@ def watch_near(model, segment, t, member_state, rel0, rel1, h, watched):
         p = model.block[k, PAIR]
         lo = model.block[k, START]
         for i in range(lo, lo + model.block[k, COUNT]):
-            for which in range(law_margins(code, model.law[k], model.curves)):
+            for which in range(law_margins(code, model.law[k], int(member_state[MODE, i]), model.curves)):
                 s0, d0, plain0 = margin_of_member(model, k, i, which, t, member_state, rel0[p], h)
                 s1, d1, plain1 = margin_of_member(model, k, i, which, t + h, member_state, rel1[p], h)
                 least = min(min(s0, s1), min(s0 + d0 / 3.0, s1 - d1 / 3.0))
@@ -203,7 +231,8 @@ def first_dip(model, t, member_state, rel0, rel1, h, parts, watched):
     for m in range(1, watched[0] + 1):
         i = watched[m]
         k = block_of(model, i) if i < first else -1
-        for which in range(law_margins(model.block[k, CODE], model.law[k], model.curves) if k >= 0 else 1):
+        mode = int(member_state[MODE, i])
+        for which in range(margins_of(model, i, mode)):
             if k >= 0:
                 p = model.block[k, PAIR]
                 s0, d0, plain = margin_of_member(model, k, i, which, t, member_state, rel0[p], h)
@@ -211,7 +240,7 @@ def first_dip(model, t, member_state, rel0, rel1, h, parts, watched):
                     continue
                 s1, d1, plain = margin_of_member(model, k, i, which, t + h, member_state, rel1[p], h)
             else:
-                s0, d0, s1, d1, plain = margins_of_contact(model, i - first, int(member_state[MODE, i]), rel0, rel1, h)
+                s0, d0, s1, d1, plain = margins_of_contact(model, i - first, which, mode, rel0, rel1, h)
             if not plain:
                 continue
             c, dip = lowest_between(s0, d0, s1, d1)
@@ -224,26 +253,24 @@ def first_dip(model, t, member_state, rel0, rel1, h, parts, watched):
 
 
 @part
-def margins_of_contact(model, j, mode, rel0, rel1, h):
-    """Margin of contact j and its change at its rate within h (s), at both poses; whether no rate is in the margin.
+def margins_of_contact(model, j, which, mode, rel0, rel1, h):
+    """A margin of contact j and its change at its rate within h (s), at both poses; whether no rate is in the margin,
+    and it is of the same end.
 
     model: the compiled scene.
-    j, mode: the contact, and the mode that it is in.
+    j, which, mode: the contact, the number of the margin (`contact_margins`), and the mode that it is in.
     rel0, rel1 (n_pair, POSE): relative poses.
     h: a time (s).
     """
     row = model.contact[j]
     p = model.contact_pair[j]
     height, rise, room, room_rate, end = contact_seen(model, j, rel0[p])
-    by_height, by_rise, by_room = contact_margin_slopes(row, height, rise, room, mode)
-    s0 = contact_margin(row, height, rise, room, mode)
+    s0, by_height, by_rise, by_room = contact_one_margin(row, which, height, rise, room, mode)
     d0 = h * (by_room * room_rate + by_height * rise)
     height, rise, room, room_rate, at_end = contact_seen(model, j, rel1[p])
-    at_height, at_rise, at_room = contact_margin_slopes(row, height, rise, room, mode)
-    s1 = contact_margin(row, height, rise, room, mode)
-    d1 = h * (at_room * room_rate + at_height * rise)
-    uneven = by_rise != 0.0 or at_rise != 0.0 or by_height != at_height or (by_room != 0.0 and end != at_end)
-    return s0, d0, s1, d1, not uneven
+    s1, _, _, _ = contact_one_margin(row, which, height, rise, room, mode)
+    d1 = h * (by_room * room_rate + by_height * rise)
+    return s0, d0, s1, d1, by_rise == 0.0 and (by_room == 0.0 or end == at_end)
 
 
 @kernel

@@ -32,8 +32,9 @@ from mdstopo.mechanics.laws.law_table import (
     law_margin_slopes,
 )
 
-#: trials of the moment of one event
-TRIALS = 100
+#: trials of the moment of one event: after LAST_FORESEEN every other one is a bisection, and so many of these come to
+#: rounding
+TRIALS, LAST_FORESEEN = 130, 15
 #: cuts of one step
 CUTS = 24
 #: margins (times rounding) at which a place behind the switch is near enough, and which is aimed at
@@ -203,7 +204,8 @@ def next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries
     """Where within a step to try next for the moment at which a margin vanishes; -1 where `high` is near enough.
 
     It is where it is foreseen, if that is between the ends; else the secant through both ends, aimed behind the switch
-    by more than rounding; after many trials every other one is a bisection.
+    by more than rounding. After many trials every other one is a bisection: where one margin takes over from another,
+    of other units and a thousand times as steep, secants come near to no root.
 
     low, high: lengths of the step between which it happens (s).
     at_low, at_high: the smallest margins there; at_high is negative.
@@ -214,11 +216,12 @@ def next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries
     """
     if high - low <= resolution or at_high >= -NEAR * rounding:
         return -1.0
-    if low < foreseen < high:
+    halve = tries > LAST_FORESEEN and tries % 2 == 0
+    if low < foreseen < high and not halve:
         return foreseen
     aim = AIM * rounding
     middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
-    if (tries > 15 and tries % 2 == 0) or middle <= low or middle >= high:
+    if halve or middle <= low or middle >= high:
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             return -1.0

@@ -69,7 +69,14 @@ class PricedCandidates(NamedTuple):
             "the first node; whether it is a whole step, a part of one, or a state alone; whether anything is virtual",
         ),
     ]
-    step_time: Annotated[FloatArray, Field("n_step, 2", "when it begins, and how long it is (s)")]
+    step_time: Annotated[
+        FloatArray,
+        Field(
+            "n_step, 2",
+            "when it begins, and how long it is (s); of a state alone, by how much later it is decided in which mode a "
+            "member is there: less than zero at the end of a step, where a built member may switch",
+        ),
+    ]
     node_pose: Annotated[FloatArray, Field("n_node, n_pose", "relative poses at NODE of each step, and their rates")]
     node_a: Annotated[FloatArray, Field("n_node, n_free", "their second derivatives")]
     node_change: Annotated[

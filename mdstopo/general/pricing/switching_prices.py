@@ -128,7 +128,7 @@ def price_followed(model, candidates, k, at, count, following, price):
 
 @kernel
 def price_point(model, candidates, k, i, s, mode, kept, begun):
-    """What member i of a law that switches does at a state alone.
+    """What member i of a law that switches does at a state alone, on the side of it that is looked at.
 
     model: with the members.
     candidates, k, i: a `PricedCandidates`, the number of the run, and the member.
@@ -145,7 +145,10 @@ def price_point(model, candidates, k, i, s, mode, kept, begun):
         p = candidates.law[k]
         second = second_rate(model, i, candidates.pose[o, 0], candidates.pose_a[o])
         rest = model.member[MEMBER_FREE_LENGTH, i]
-        mode = law_start(code, p, x, rate, second, candidates.when[o], model.curves, rest)
+        shift = candidates.step_time[s, 1]
+        mode = law_start(
+            code, p, x + shift * rate, rate + shift * second, second, candidates.when[o] + shift, model.curves, rest
+        )  # fmt: skip
         kept = law_first_set(code, p, x, mode)
     _, _, along = member_work(model, i, candidates.pose[o, 0], candidates.change[o, 0])
     f, _, _, energy, _ = law(

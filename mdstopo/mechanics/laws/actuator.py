@@ -47,6 +47,25 @@ def actuator_margin_slopes(p, x, xd, mode):
 
 
 @inline
+def actuator_margins(mode):
+    """How many margins a mode has: in the linear one there are two limits."""
+    return 2 if mode == LINEAR else 1
+
+
+@inline
+def actuator_one_margin(p, which, x, xd, mode):
+    """One margin and its slopes by x, xd and time, where there is a limit: in the linear mode up to the upper one, then
+    to the lower one."""
+    f = (p[0] * (x - p[2]) + p[1] * xd) / p[3]
+    sign = 1.0 / p[3]
+    if mode == UPPER:
+        return f - 1.0, sign * p[0], sign * p[1], 0.0
+    if mode == LINEAR and which == 1:
+        return 1.0 + f, sign * p[0], sign * p[1], 0.0
+    return (1.0 if mode == LINEAR else -1.0) - f, -sign * p[0], -sign * p[1], 0.0
+
+
+@inline
 def actuator_slopes(p, place, x, xd, mode):
     """Slopes of force and energy by a parameter: df/dp, dV/dp."""
     if mode != LINEAR:
@@ -115,6 +134,8 @@ KERNELS = LawKernels(
         margin=actuator_margin,
         margin_slopes=actuator_margin_slopes,
         margin_slope=actuator_margin_slope,
+        margins=actuator_margins,
+        one_margin=actuator_one_margin,
         next_mode=actuator_next,
         first_mode=actuator_start,
         switches=actuator_switches,

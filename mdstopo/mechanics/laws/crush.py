@@ -44,6 +44,26 @@ def crush_margin(p, x, xd, mode):
 
 
 @inline
+def crush_margins(mode):
+    """How many margins a mode has: while it is elastic a member may lose contact, or reach its plateau."""
+    return 2 if mode == ELASTIC else 1
+
+
+@inline
+def crush_one_margin(p, which, x, xd, mode):
+    """One margin and its slopes by x, xd and time; while it is elastic, up to where contact is lost and to the
+    plateau."""
+    if mode == CRUSHING:
+        return p[3] * xd, 0.0, p[3], 0.0
+    y = p[3] * x - p[2]
+    if mode == OPEN:
+        return -y, -p[3], 0.0, 0.0
+    if which == 0:
+        return y, p[3], 0.0, 0.0
+    return p[1] / p[0] - y, -p[3], 0.0, 0.0
+
+
+@inline
 def crush_margin_slopes(p, x, xd, mode):
     """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
     if mode == CRUSHING:
@@ -152,6 +172,8 @@ KERNELS = LawKernels(
         margin=crush_margin,
         margin_slopes=crush_margin_slopes,
         margin_slope=crush_margin_slope,
+        margins=crush_margins,
+        one_margin=crush_one_margin,
         next_mode=crush_next,
         first_mode=crush_start,
         idle=crush_idle,

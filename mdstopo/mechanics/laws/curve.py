@@ -101,6 +101,24 @@ def curve_margin_slopes(p, x, mode, curves):
     return 1.0, 0.0
 
 
+@inline
+def curve_margins(p, mode):
+    """How many ends a piece of the curve has; none where steps need not end at knots."""
+    if mode <= 0:
+        return 0
+    return 2 if 1 < mode <= int(p[1]) else 1
+
+
+@inline
+def curve_one_margin(p, which, x, mode, curves):
+    """How far x is from the lower or, where there is none or it is the second, the upper end of its piece (m), and
+    slopes by x, xd and time."""
+    at = int(p[0])
+    if which == 0 and mode > 1:
+        return x - curves[at + mode - 2] + p[3], 1.0, 0.0, 0.0
+    return curves[at + mode - 1] - x + p[3], -1.0, 0.0, 0.0
+
+
 def curve_data(record: CurveLaw, at: int) -> tuple[list[float], list[float]]:
     """Parameters and data of a curve whose data begin at place `at`."""
     from scipy.interpolate import PchipInterpolator
@@ -125,6 +143,8 @@ KERNELS = LawKernels(
     modes=Modes(
         margin=curve_margin,
         margin_slopes=curve_margin_slopes,
+        margins=curve_margins,
+        one_margin=curve_one_margin,
         next_mode=curve_piece,
         first_mode=curve_start,
         pieces=True,

@@ -70,6 +70,24 @@ def gap_margin_slopes(p, x, xd, mode):
 
 
 @inline
+def gap_margins(p, mode):
+    """How many margins a mode has: in contact, with clip, that of contact and that of the force."""
+    return 2 if mode != OPEN and _clips(p) else 1
+
+
+@inline
+def gap_one_margin(p, which, x, xd, mode):
+    """One margin and its slopes by x, xd and time: in contact, up to where contact is lost, then that of the force."""
+    y = p[3] * x - p[2]
+    if mode == OPEN:
+        return -y, -p[3], 0.0, 0.0
+    if which == 0:
+        return y, p[3], 0.0, 0.0
+    sign = (1.0 if mode == CLOSED else -1.0) / (p[0] + p[1])
+    return sign * (p[0] * y + p[1] * p[3] * xd), sign * p[0] * p[3], sign * p[1] * p[3], 0.0
+
+
+@inline
 def gap_slopes(p, place, x, xd, mode):
     """Slopes of force and energy by a parameter: df/dp, dV/dp."""
     if mode == OPEN:
@@ -161,6 +179,8 @@ KERNELS = LawKernels(
         margin=gap_margin,
         margin_slopes=gap_margin_slopes,
         margin_slope=gap_margin_slope,
+        margins=gap_margins,
+        one_margin=gap_one_margin,
         next_mode=gap_next,
         first_mode=gap_start,
         idle=gap_idle,

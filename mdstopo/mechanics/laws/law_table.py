@@ -257,8 +257,8 @@ def law_margin_by_time(code, p, x, xd, mode, t, curves, l0):
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margins, inline)
-def law_margins(code, p, curves):
-    """How many margins a law has of which `law_margin` is the least."""
+def law_margins(code, p, mode, curves):
+    """How many margins a law has in a mode, of which `law_margin` is the least."""
     return 1
 
 
