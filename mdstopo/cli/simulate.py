@@ -28,6 +28,7 @@ from mdstopo.shown import counted
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, FloatArray
+    from mdstopo.engine import Evaluator
     from mdstopo.scene.settled import Settled
     from mdstopo.store.contents import Motion
 
@@ -75,8 +76,6 @@ def command(
     with output_file(path, case, "simulate", overwrite=overwrite, notify=output.notice, command=command_line) as file:
         announce_compilation(output, case)
         from mdstopo.engine import Evaluator
-        from mdstopo.session.coarse_steps import coarse_steps
-        from mdstopo.session.near_zero import near_zero
         from mdstopo.status import RunStatus, Status
         from mdstopo.store.contents import design_part, trajectory_part
 
@@ -84,10 +83,7 @@ def command(
         engine = Evaluator(case)
         check_design(engine, alpha, alpha_path)
         ready = time.perf_counter()
-        motions = {}
-        for name in chosen:
-            with told_while(output.notice, case, engine, alpha, name):
-                motions[name] = engine.trajectory(alpha, name)
+        motions = _motions(output, case, engine, alpha, chosen)
         ended = time.perf_counter()
         rests = {name: engine.settled(alpha, name) for name in chosen}
         failed = [motion for motion in motions.values() if motion.status is not Status.OK]
@@ -104,9 +100,7 @@ def command(
         )
     output.say(f"{case.title or case.name}: {reason}")
     for name, motion in motions.items():
-        _say_motion(output, case, name, motion)
-        if rests[name] is not None:
-            output.say(f"  {rests[name]}")
+        _say_motion(output, case, name, motion, rests[name])
     output.table(
         [
             *rows_of(case, values),
@@ -129,8 +123,7 @@ def command(
             "path": str(path),
         }
     )
-    for warning in filter(None, (*(coarse_steps(case, *each) for each in motions.items()), near_zero(case, engine))):
-        output.notice(f"warning: {warning}")
+    _warn(output, case, engine, motions)
     return 1 if failed else 0
 
 
@@ -142,7 +135,28 @@ def _load_cases(case: "Case", names: tuple[str, ...]) -> list[str]:
     return list(names) or known
 
 
-def _say_motion(output: Output, case: "Case", name: str, motion: "Motion") -> None:
+def _motions(
+    output: Output, case: "Case", engine: "Evaluator", alpha: "FloatArray", names: list[str]
+) -> "dict[str, Motion]":
+    """The motion of each of these load cases; one that takes long says how far it is."""
+    motions = {}
+    for name in names:
+        with told_while(output.notice, case, engine, alpha, name):
+            motions[name] = engine.trajectory(alpha, name)
+    return motions
+
+
+def _warn(output: Output, case: "Case", engine: "Evaluator", motions: "dict[str, Motion]") -> None:
+    """Tell of steps that are coarse beside vibrations, and of integrals that are nearly zero."""
+    from mdstopo.session.coarse_steps import coarse_steps
+    from mdstopo.session.near_zero import near_zero
+
+    for warning in (*(coarse_steps(case, *each) for each in motions.items()), near_zero(case, engine)):
+        if warning:
+            output.notice(f"warning: {warning}")
+
+
+def _say_motion(output: Output, case: "Case", name: str, motion: "Motion", rest: "Settled | None") -> None:
     output.say(
         f"load case {name}: {counted(len(motion.t) - 1, 'step')} from {number(motion.t[0])} to {number(motion.t[-1])} s"
     )
@@ -154,6 +168,8 @@ def _say_motion(output: Output, case: "Case", name: str, motion: "Motion") -> No
         place = q[:3]  # in space the attitude stands in the result file
         rows.append([body, *(number(value) for value in (*place, *v))])
     output.table(rows)
+    if rest is not None:
+        output.say(f"  {rest}")
 
 
 def _last(case: "Case", motion: "Motion") -> "dict[str, tuple[FloatArray, FloatArray]]":
