@@ -29,6 +29,7 @@ from mdstopo.shown import counted
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, FloatArray
     from mdstopo.engine import Evaluator
+    from mdstopo.evaluation import Trajectory
     from mdstopo.scene.settled import Settled
     from mdstopo.store.contents import Motion
 
@@ -137,7 +138,7 @@ def _load_cases(case: "Case", names: tuple[str, ...]) -> list[str]:
 
 def _motions(
     output: Output, case: "Case", engine: "Evaluator", alpha: "FloatArray", names: list[str]
-) -> "dict[str, Motion]":
+) -> "dict[str, Trajectory]":
     """The motion of each of these load cases; one that takes long says how far it is."""
     motions = {}
     for name in names:
@@ -146,7 +147,7 @@ def _motions(
     return motions
 
 
-def _warn(output: Output, case: "Case", engine: "Evaluator", motions: "dict[str, Motion]") -> None:
+def _warn(output: Output, case: "Case", engine: "Evaluator", motions: "dict[str, Trajectory]") -> None:
     """Tell of steps that are coarse beside vibrations, and of integrals that are nearly zero."""
     from mdstopo.session.coarse_steps import coarse_steps
     from mdstopo.session.near_zero import near_zero

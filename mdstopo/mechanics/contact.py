@@ -101,7 +101,12 @@ def contact_margins(c, mode):
 
 @inline
 def contact_one_margin(c, which, height, rise, room, mode):
-    """One margin and its slopes by height, rise and room: of height, then of room, then of the normal force."""
+    """One margin of a mode and its slopes by height, rise and room.
+
+    c: the numbers of the contact. which, mode: 0 of height, 1 of room, 2 of the normal force, as many as
+    `contact_margins` of the mode; of those that are not on the edge the height alone.
+    height, rise, room: where the point is (m), how fast it rises (m/s), and how far it is from the nearer end (m).
+    """
     if mode == ABOVE:
         return height, 1.0, 0.0, 0.0
     if which == 0:
