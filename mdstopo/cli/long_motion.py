@@ -6,8 +6,6 @@ from contextlib import contextmanager
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from mdstopo.cli.output import duration, number
 
 if TYPE_CHECKING:
@@ -65,6 +63,8 @@ def told_while(
 def steps_done(driver: "SceneDriver") -> "FloatArray":
     """Times of the steps that a driver has made so far in its present run (s), the start first: room has them first,
     and behind them zeros."""
+    import numpy as np
+
     room, most = driver.room, int(cast("Any", driver).limits[1])
     t = room[: most + 1].copy()
     return t[: int(np.argmin(np.append(np.diff(t) > 0.0, False))) + 1]

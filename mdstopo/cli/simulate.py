@@ -29,7 +29,7 @@ from mdstopo.shown import counted
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, FloatArray
     from mdstopo.engine import Evaluator
-    from mdstopo.evaluation import Trajectory
+    from mdstopo.integrators.trajectory import Trajectory
     from mdstopo.scene.settled import Settled
     from mdstopo.store.contents import Motion
 

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from mdstopo.case.responses.response_units import BOUNDED, bounded, constrained, unit_of_bound, unit_of_value, words
 from mdstopo.cli.output import number
 
 if TYPE_CHECKING:
@@ -64,6 +63,8 @@ def is_kept(row: "VolumeRow | ResponseRow", value: float, tolerance: float) -> b
 
 def rows_of(case: "Case", found: Values) -> list[list[str]]:
     """The values as rows of a table."""
+    from mdstopo.case.responses.response_units import bounded, constrained, unit_of_value, words
+
     rows = []
     for each in case.objectives:
         if each.name in found.objectives:
@@ -83,6 +84,8 @@ def rows_of(case: "Case", found: Values) -> list[list[str]]:
 
 def document_of(case: "Case", found: Values) -> dict[str, Any]:
     """The values for JSON."""
+    from mdstopo.case.responses.response_units import BOUNDED, constrained, unit_of_bound, unit_of_value
+
     units = {each.name: unit_of_value(each) for each in case.objectives}
     return {
         "objectives": {

@@ -13,6 +13,7 @@ from mdstopo.general.pricing.certain_modes import (
     FASTEST,
     FREE,
     HIGH,
+    LINEAR_NUMBERS,
     LOCAL,
     LOW,
     PART_NUMBERS,
@@ -90,7 +91,9 @@ def bounds(kinematics, points, stated, rest, r):
     w, bound = np.zeros((4, axes)), np.zeros(4)
     _fill_part(rest, line, rows, sum(off), number, w)
     frame = _frames(kinematics, r[None])
-    return (bound if _fill_bounds(axes, frame, 0, line, rows, number, w, bound) else None), number
+    return (
+        bound if _fill_bounds(axes, frame, 0, line, rows, number, w, np.zeros(LINEAR_NUMBERS), bound) else None
+    ), number
 
 
 @pytest.mark.usefixtures("in_python")

@@ -175,7 +175,9 @@ def test_values_of_each_member_go_with_their_members(capsys) -> None:
     kept = np.array([1, 3, 5, 7])  # the same of port and star
     reduced, own, final, told = final_of(case, kept, design)
     assert unlike(case, kept) == set()
-    assert told == ["constraints[2] is left out: all that it sums up are parameters of laws, which are numbers now"]
+    assert told == [
+        "constraints[2] (volume of feet) is left out: all that it sums up are parameters of laws, which are numbers now"
+    ]
     names = ["port_1", "port_3", "feet_0", "feet_1", "star_1", "star_3"]
     assert [g.name for g in final.members] == names
     law = {g.name: g.laws for g in final.members}
