@@ -254,7 +254,7 @@ def test_members_without_size_are_left_out() -> None:
     assert [sentence.partition(" is left out")[0] for sentence in told] == [
         "the objective force",
         "constraints[0] (volume of legs)",
-        "constraints[1] (max force in legs)",
+        "constraints[1] (max member force in legs)",
     ]
 
 
