@@ -144,16 +144,7 @@ def first_piece(run, room, segment, t, h, starting, end_q, ends):
         room.cut[top] = middle
         copy_rows(run.state, room.kept)
         code, _, singular = make_step(
-            run,
-            segment,
-            t,
-            middle,
-            starting,
-            np.int64(-1),
-            room.kept,
-            room.beyond_q[top],
-            room.beyond[top],
-            room.push,
+            run, segment, t, middle, starting, np.int64(-1), room.kept, room.beyond_q[top], room.beyond[top], room.push
         )
         if code != OK:
             break

@@ -23,10 +23,12 @@ end of one row and the beginning of the next.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.priced_candidates import (
     CODE,
     FIRST_NODE,
@@ -88,12 +90,32 @@ UNSURE = -1
 LEAVES = -2
 
 
+#: the arrays of `Spans`
+SPANS = (
+    "line", "number", "w", "bound", "linear", "row_line", "row_number", "row_place", "column_place", "split",
+)  # fmt: skip
+
+
+class Spans:
+    """Where the points of a tile's parts are, inside kernels, and scratch for bounds of what their members do.
+
+    line (BOUND_PARTS + 1, LOCAL or STATED, MIDDLE or HALF, axes): of the second points of each part, and last of all
+    first points. number (BOUND_PARTS, PART_NUMBERS): of the parts. w (4, axes), bound (4,), linear (LINEAR_NUMBERS,):
+    scratch. For single members: row_line (ROW_LINES, 2, 2, axes): the lines of first points. row_number (ROW_LINES,
+    LINED_PARTS, PART_NUMBERS): of parts with each of these. row_place (TALL,), column_place (levels, BROAD): where
+    points are on their lines, from -1 to 1. split (1,): the first row of the second line.
+    """
+
+    def __init__(self, *_arrays: Any) -> None: ...
+
+
+bundle(Spans, SPANS)
+
+
 @kernel
 def make_spans(axes):
-    """Lines (parts and rows, LOCAL or STATED, MIDDLE or HALF, axes), numbers of parts, vectors, bounds, linear
-    functions; then, for single members, lines of rows, numbers of parts with these, where rows are on their lines, and
-    columns on those of the parts of two levels, and the first row of the second line: scratch."""
-    return (
+    """A `Spans`."""
+    return Spans(
         np.zeros((BOUND_PARTS + 1, 2, 2, axes)),
         np.zeros((BOUND_PARTS, PART_NUMBERS)),
         np.zeros((4, axes)),
@@ -115,9 +137,12 @@ def fill_spans(candidates, k, i, j, spans):
       candidates, k: a `PricedCandidates`, and the number of the run.
       i, j: the tile.
     Out:
-      spans: of `make_spans`.
+      spans: a `Spans`.
     """
-    line, number, w, _, _, row_line, lined_number, row_place, column_place, split = spans
+    line, number, w, split = spans.line, spans.number, spans.w, spans.split
+    row_line, row_number, row_place, column_place = (
+        spans.row_line, spans.row_number, spans.row_place, spans.column_place,
+    )  # fmt: skip
     scene = candidates.run[k, SCENE]
     grids = (candidates.first[scene], candidates.first_stated[scene])
     others = (candidates.second[scene], candidates.second_stated[scene])
@@ -150,7 +175,7 @@ def fill_spans(candidates, k, i, j, spans):
                 continue
             part = (1 << level) - 1 + at - LINED_FIRST
             for n in range(ROW_LINES):
-                _fill_part(candidates.rest[k], own, row_line[n], beside[n] + off, lined_number[n, part], w)
+                _fill_part(candidates.rest[k], own, row_line[n], beside[n] + off, row_number[n, part], w)
             place = column_place[level - LINED_LEVEL, at * size : (at + 1) * size]
             _fill_places(others[LOCAL], j * BROAD + at * size, own[LOCAL], place)
 
@@ -159,7 +184,7 @@ def fill_spans(candidates, k, i, j, spans):
 def rows_of_line(n, height, split):
     """The first row of line n, and the one behind its last.
 
-    n, height: the line, and rows of the tile. split (1,): of `make_spans`.
+    n, height: the line, and rows of the tile. split (1,): of `Spans`.
     """
     if n == 0:
         return np.int64(0), np.int64(split[0])
@@ -289,13 +314,23 @@ def _fill_bounds(axes, frame, at_row, line, rows, number, w, linear, bound):
     """
     if not fill_linear(axes, frame, at_row, line, rows, number, w, linear):
         return False
+    fill_bound(linear, bound)
+    return True
+
+
+@part
+def fill_bound(linear, bound):
+    """Bounds of linear functions of the places of both points on their lines.
+
+    linear (LINEAR_NUMBERS,): of `fill_linear`.
+    bound (4,): set.
+    """
     spread = abs(linear[X_SECOND]) + abs(linear[X_FIRST])
     bound[LOW] = linear[X] - spread - linear[X_LESS]
     bound[HIGH] = linear[X] + spread + linear[X_MORE]
     spread = abs(linear[V_SECOND]) + abs(linear[V_FIRST]) + linear[V_OFF]
     bound[SLOWEST] = linear[V] - spread
     bound[FASTEST] = linear[V] + spread
-    return True
 
 
 @part
@@ -443,12 +478,12 @@ def modes_at_nodes(model, candidates, k, s, which, spans, mode):
       which: number of the part.
     Out:
       mode (NODES,): of all, or UNSURE where bounds do not tell.
-      spans: of `make_spans`, of which the bounds are overwritten.
+      spans: a `Spans`, of which the bounds are overwritten.
     """
     code = candidates.run[k, CODE]
     p = candidates.law[k]
     curves = model.curves
-    line, number, w, bound, linear = spans[:5]
+    line, number, w, bound, linear = spans.line, spans.number, spans.w, spans.bound, spans.linear
     rest = number[which, FREE]
     axes = freedoms(model) - rotations(model)
     for m in range(NODES):
@@ -477,7 +512,7 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
       mode: that all begin in; negative where it is to be found: the law does not remember, or has not begun.
       low, high: the least and the largest of their permanent sets (m).
     Out:
-      spans: of `make_spans`, of which the bounds are overwritten.
+      spans: a `Spans`, of which the bounds are overwritten.
 
     Returns UNSURE, a mode of which none leaves, or LEAVES less the mode that all leave; and the mode that all end in.
     """
@@ -485,7 +520,7 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
     code = run[CODE]
     p = candidates.law[k]
     curves = model.curves
-    line, number, w, bound, linear = spans[:5]
+    line, number, w, bound, linear = spans.line, spans.number, spans.w, spans.bound, spans.linear
     rows = line[ROWS_OF_ALL]
     line = line[which]
     number = number[which]

@@ -7,6 +7,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.pricing.certain_modes import make_spans
+from mdstopo.general.pricing.loaded_members import load_all
 from mdstopo.general.pricing.sorted_members import make_sorting
 from mdstopo.general.pricing.switching_prices import make_following
 from mdstopo.general.pricing.switching_together import make_switching
@@ -51,8 +52,8 @@ class PricedTile:
 
     model: with room for 2 PLACES members, which are overwritten. candidates, k: a `PricedCandidates`, and the number of
     the run. grids, i, j, error: as of `tile_interpolation.take_prices`. height, width: rows and columns of the tile.
-    lists: its `StepLists`. scratch, spans, following, switching: of `tile_interpolation.make_scratch`, `make_spans`,
-    `make_following` and `make_switching`. sorting: a `Sorting`. price (PLACES,): of the members, added to.
+    lists: its `StepLists`. scratch, following, switching: of `tile_interpolation.make_scratch`, `make_following` and
+    `make_switching`. spans: its `Spans`. sorting: a `Sorting`. price (PLACES,): of the members, added to.
     """
 
     def __init__(self, *_parts: Any) -> None: ...
@@ -101,3 +102,11 @@ def begin_pricing(model, candidates, k, place, scratch, lists, price):
         model, candidates, k, grids, i, j, height, width, error, lists, scratch, make_spans(candidates.first.shape[1]),
         make_following(), make_sorting(), make_switching(), price,
     )  # fmt: skip
+
+
+@kernel
+def load_tile(tile):
+    """Write all members of a `PricedTile` into its model, unless they are there."""
+    if tile.lists.todo[LOADED] == 0:
+        load_all(tile.model, tile.candidates, tile.k, tile.grids, tile.i, tile.j, tile.lists.whole)
+        tile.lists.todo[LOADED] = 1

@@ -12,11 +12,15 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, larger, load, negative, zero
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODES
 from mdstopo.general.pricing.certain_modes import (
+    FASTEST,
+    HIGH,
     LINEAR_NUMBERS,
     LINED_AT_ONCE,
     LINED_FIRST,
     LINED_LEVEL,
+    LOW,
     ROW_LINES,
+    SLOWEST,
     V_FIRST,
     V_OFF,
     V_SECOND,
@@ -26,6 +30,7 @@ from mdstopo.general.pricing.certain_modes import (
     X_SECOND,
     V,
     X,
+    fill_bound,
     fill_linear,
     rows_of_line,
 )
@@ -36,10 +41,10 @@ from mdstopo.general.pricing.sorted_members import (
     CORNERS,
     COUNT,
     SURE,
-    TRIED,
     UNSORTED,
     fill_tangents,
     join_class,
+    try_mode,
 )
 from mdstopo.general.pricing.switching_prices import CLOSE
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, rotations
@@ -61,7 +66,7 @@ def sort_by_lines(model, candidates, k, s, level, first, height, spans, sorting)
       model: with the numbers of the laws.
       candidates, k, s: a `PricedCandidates`, and the numbers of the run and of the step.
       level, first, height: of the part, its first column, and how many rows it has.
-      spans: of `make_spans`.
+      spans: the tile's `Spans`.
     In place:
       sorting: a `Sorting`: classes of these members are set, UNSORTED for all others, and added to those that
         there are; the modes that were tried are set, and the tangents of their margins in a range that all are in.
@@ -79,7 +84,7 @@ def sort_by_lines(model, candidates, k, s, level, first, height, spans, sorting)
     for at in range(parts):
         which = (1 << inner) - 1 + first // size + at
         for n in range(ROW_LINES):
-            begin, behind = rows_of_line(n, height, spans[9])
+            begin, behind = rows_of_line(n, height, spans.split)
             if begin < behind and not _fill_nodes(model, candidates, s, which, n, spans, linear[at, n], box):
                 return np.int64(-1)
     count = _modes_to_try(code, p, model.curves, candidates.step_time[s, 0], box, linear[:parts], tried)
@@ -91,16 +96,16 @@ def sort_by_lines(model, candidates, k, s, level, first, height, spans, sorting)
         own = join_class(tried[mode], tried[mode], 1, classes)
         if own == UNSORTED:
             continue
-        classes[own, COUNT] -= 1
+        classes[own, COUNT] -= 1  # members are counted below; a class that stays empty is the next mode's
         for at in range(parts):
             begins = first + at * size
-            place = spans[8][inner - LINED_LEVEL, begins : begins + size]
+            place = spans.column_place[inner - LINED_LEVEL, begins : begins + size]
             for n in range(ROW_LINES):
-                begin, behind = rows_of_line(n, height, spans[9])
+                begin, behind = rows_of_line(n, height, spans.split)
                 if begin < behind:
                     functions = _fill_below(tangent[mode], linear[at, n], below)
                     classes[own, COUNT] += _sort_rows(
-                        own, begin, behind, begins, functions, below, place, spans[7], kind
+                        own, begin, behind, begins, functions, below, place, spans.row_place, kind
                     )
     return count
 
@@ -117,11 +122,11 @@ def _fill_nodes(model, candidates, s, which, n, spans, linear, box):
       box (4,): the least and the largest elongation (m), and the least and the largest rate (m/s): widened to these.
     Out:
       linear (NODES, LINEAR_NUMBERS): set.
-      spans: of `make_spans`, of which the vectors are overwritten.
+      spans: a `Spans`, of which vectors and bounds are overwritten.
 
     Returns whether there are any: not where ends may meet.
     """
-    line, w, row_line, number = spans[0], spans[2], spans[5], spans[6]
+    line, w, row_line, number, bound = spans.line, spans.w, spans.row_line, spans.row_number, spans.bound
     axes = freedoms(model) - rotations(model)
     for m in range(NODES):
         own = linear[m]
@@ -130,12 +135,11 @@ def _fill_nodes(model, candidates, s, which, n, spans, linear, box):
             number[n, which - LINED_FIRST], w, own,
         ):  # fmt: skip
             return False
-        spread = abs(own[X_SECOND]) + abs(own[X_FIRST])
-        box[0] = min(box[0], own[X] - spread - own[X_LESS])
-        box[1] = max(box[1], own[X] + spread + own[X_MORE])
-        spread = abs(own[V_SECOND]) + abs(own[V_FIRST]) + own[V_OFF]
-        box[2] = min(box[2], own[V] - spread)
-        box[3] = max(box[3], own[V] + spread)
+        fill_bound(own, bound)
+        box[LOW] = min(box[LOW], bound[LOW])
+        box[HIGH] = max(box[HIGH], bound[HIGH])
+        box[SLOWEST] = min(box[SLOWEST], bound[SLOWEST])
+        box[FASTEST] = max(box[FASTEST], bound[FASTEST])
     return True
 
 
@@ -161,12 +165,7 @@ def _modes_to_try(code, p, curves, t, box, linear, tried):
             x = own[X]
             rate = own[V]
         now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, 1.0))
-        new = count < TRIED
-        for n in range(count):
-            new = new and tried[n] != now
-        if new:
-            tried[count] = now
-            count += 1
+        count = try_mode(now, count, tried)
     return count
 
 

@@ -88,6 +88,38 @@ def make_sorting():
 
 
 @part
+def try_mode(now, count, tried):
+    """Add a mode to those that are tried, unless it is there or they are TRIED.
+
+    now, count, tried (TRIED,): the mode, how many there are, and the modes.
+
+    Returns how many there are then.
+    """
+    new = count < TRIED
+    for n in range(count):
+        new = new and tried[n] != now
+    if not new:
+        return count
+    tried[count] = now
+    return count + 1
+
+
+@part
+def least_margin(tangent, x, rate):
+    """The margins of a vector of members in a mode: the least of the tangents.
+
+    tangent (CORNERS, TANGENT_NUMBERS): of the mode.
+    x, rate: elongations (m) and rates (m/s), vectors.
+    """
+    over = zero() - np.inf
+    for corner in range(CORNERS):
+        own = tangent[corner]
+        value = own[BY_ELONGATION] * x + own[BY_RATE] * rate + own[AT_ZERO]
+        over = larger(over, zero() - value)
+    return zero() - over
+
+
+@part
 def join_class(old, new, count, classes):
     """Add members to the class of those that begin in one mode and end in another, which is made if there is none.
 
@@ -240,13 +272,9 @@ def _fill_masks(modes, i, sorting, inside, outside):
         x = load(works[m, ELONGATION], i)
         rate = load(works[m, RATE], i)
         for n in range(modes):
-            over = zero() - np.inf
-            for corner in range(CORNERS):
-                own = tangent[n, corner]
-                value = own[BY_ELONGATION] * x + own[BY_RATE] * rate + own[AT_ZERO]
-                over = larger(over, zero() - value)
-            inside[n, m] = ~negative(zero() - over - (CLOSE if m == 0 else SURE))
-            outside[n, m] = negative(zero() - over + SURE)
+            margin = least_margin(tangent[n], x, rate)
+            inside[n, m] = ~negative(margin - (CLOSE if m == 0 else SURE))
+            outside[n, m] = negative(margin + SURE)
 
 
 @part
@@ -315,12 +343,7 @@ def _fill_tried(code, p, curves, t, first, size, known, begin, sorting):
             now = begin[_place(first, i)]
         else:
             now = np.int64(law_start(code, p, box[i // 2], box[2 + i % 2], 0.0, t, curves, 1.0))
-        new = count < TRIED
-        for n in range(count):
-            new = new and tried[n] != now
-        if new:
-            tried[count] = now
-            count += 1
+        count = try_mode(now, count, tried)
     fill_tangents(code, p, curves, t, box, count, tried, tangent)
     return count
 
@@ -364,11 +387,7 @@ def _stay_in(n, i, sorting):
             continue
         x = load(works[m, ELONGATION], i)
         rate = load(works[m, RATE], i)
-        over = zero() - np.inf
-        for corner in range(CORNERS):
-            value = own[corner, BY_ELONGATION] * x + own[corner, BY_RATE] * rate + own[corner, AT_ZERO]
-            over = larger(over, zero() - value)
-        bits &= ~negative(zero() - over - (CLOSE if m == 0 else SURE))
+        bits &= ~negative(least_margin(own, x, rate) - (CLOSE if m == 0 else SURE))
     return bits
 
 

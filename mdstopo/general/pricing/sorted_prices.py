@@ -12,8 +12,8 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import WIDE
 from mdstopo.general.model.priced_candidates import CODE, FIRST_STAGE, KIND, LAST_STAGE, MOVES, WHOLE
 from mdstopo.general.pricing.certain_modes import BOUND_LEVELS, NARROW, UNSURE, modes_at_nodes
-from mdstopo.general.pricing.loaded_members import add_states, load_all, take_members
-from mdstopo.general.pricing.priced_tile import LOADED
+from mdstopo.general.pricing.loaded_members import add_states, take_members
+from mdstopo.general.pricing.priced_tile import load_tile
 from mdstopo.general.pricing.sorted_by_lines import sort_by_lines
 from mdstopo.general.pricing.sorted_members import (
     CLASSES,
@@ -71,9 +71,7 @@ def price_part(tile, s, level, first, size, smooth, begun):
     model, candidates, k, lists, sorting = tile.model, tile.candidates, tile.k, tile.lists, tile.sorting
     classes, places = sorting.classes, sorting.places
     code = candidates.run[k, CODE]
-    if lists.todo[LOADED] == 0:
-        load_all(model, candidates, k, tile.grids, tile.i, tile.j, lists.whole)
-        lists.todo[LOADED] = 1
+    load_tile(tile)
     classes[:] = 0
     if level != NO_LEVEL:
         _sort_part(tile, s, level, first)

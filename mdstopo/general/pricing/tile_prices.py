@@ -31,8 +31,8 @@ from mdstopo.general.model.priced_candidates import (
     WHOLE,
 )
 from mdstopo.general.pricing.certain_modes import LEAVES, UNSURE, fill_spans, modes_at_nodes, modes_in_step
-from mdstopo.general.pricing.loaded_members import add_states, load_all, load_members, loaded_at
-from mdstopo.general.pricing.priced_tile import LEAST, LISTED_PARTS, LOADED, MOST, SAME, SETS, begin_pricing
+from mdstopo.general.pricing.loaded_members import add_states, load_members, loaded_at
+from mdstopo.general.pricing.priced_tile import LEAST, LISTED_PARTS, LOADED, MOST, SAME, SETS, begin_pricing, load_tile
 from mdstopo.general.pricing.sorted_members import modes_of_all
 from mdstopo.general.pricing.sorted_prices import NO_LEVEL, price_part
 from mdstopo.general.pricing.switching_prices import ROW, add_pieces, price_point, price_step
@@ -267,9 +267,7 @@ def _follow_each(tile, u, begun, ends, smallest):
     model, candidates, k, price, lists = tile.model, tile.candidates, tile.k, tile.price, tile.lists
     modes, sets, fresh, height = lists.modes, lists.sets, lists.fresh, tile.height
     run = candidates.run[k]
-    if lists.todo[LOADED] == 0:
-        load_all(model, candidates, k, tile.grids, tile.i, tile.j, lists.whole)
-        lists.todo[LOADED] = 1
+    load_tile(tile)
     first = smallest * SHORT
     wide = min(SHORT, tile.width - first)
     s = run[FIRST_STEP] + u
