@@ -27,11 +27,11 @@ class MeshError(ValueError):
     """The file is no mesh that can be read; a sentence without a full stop."""
 
 
-class MeshFile(FileName):
-    """The path of an STL or OBJ file, relative to the case file: its vertices, each once, in the file's order."""
+class _OfMesh(FileName):
+    """The path of an STL or OBJ file, relative to the case file, and what is made of it."""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """Points (n, 3) of the file that a node names, or BAD with a mistake noted."""
+        """What is made of the file that a node names, or BAD with a mistake noted."""
         name = super().read(node, path, reading)
         if name is BAD:
             return BAD
@@ -39,28 +39,28 @@ class MeshFile(FileName):
         try:
             if isinstance(data, str):
                 raise MeshError(data)
-            return read_only(vertices(name, data))
+            return self._made(name, data)
         except MeshError as error:
             reading.mistake(path, str(error), node)
             return BAD
 
+    def _made(self, name: str, data: bytes) -> Any:
+        """What is made of a file of that name; raises MeshError."""
+        raise NotImplementedError
 
-class MeshFaces(FileName):
-    """The path of an STL or OBJ file, relative to the case file: its faces."""
 
-    def read(self, node: Node, path: str, reading: Reading) -> Any:
-        """Corners (n, 3), faces and sharp edges of the mesh in the file, or BAD with a mistake noted."""
-        name = super().read(node, path, reading)
-        if name is BAD:
-            return BAD
-        data = reading.include(name)
-        try:
-            if isinstance(data, str):
-                raise MeshError(data)
-            return surface(name, data)
-        except MeshError as error:
-            reading.mistake(path, str(error), node)
-            return BAD
+class MeshFile(_OfMesh):
+    """The path of an STL or OBJ file, relative to the case file: its vertices (n, 3), each once, in its order."""
+
+    def _made(self, name: str, data: bytes) -> Any:
+        return read_only(vertices(name, data))
+
+
+class MeshFaces(_OfMesh):
+    """The path of an STL or OBJ file, relative to the case file: corners (n, 3), faces and sharp edges of its mesh."""
+
+    def _made(self, name: str, data: bytes) -> Any:
+        return surface(name, data)
 
 
 def is_mesh(name: str) -> bool:
