@@ -20,7 +20,7 @@ from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
 from mdstopo.case.scene.candidates import mirrored_groups
 from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
-from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
+from mdstopo.evaluation import USUAL, Evaluation, FloatArray, MotionValues, Peak, Rows, Shape
 from mdstopo.integrators.integrator_choice import choose, method_of
 from mdstopo.integrators.scene_driver import DriverOptions, Method, ResponseResult, Scene, SceneDriver
 from mdstopo.integrators.steps import WORK, work_named
@@ -195,9 +195,7 @@ class Evaluator:
                 status, message = Status.STEP_TOO_LARGE, too_coarse
                 break
             result = begun[name].result() if begun else self._timed(name, driver, design, exact, rows)
-            status, diagnosis = result.status, ""
-            if not status.ok or result.meeting >= 0 or result.unresolved >= 0:
-                status, diagnosis = self._verdict(name, design, result)
+            status, diagnosis = self._verdict(name, design, result)
             gradients, across = (result.gradients, result.across) if exact else (None, None)
             if status.ok and gradient and not exact:
                 found = cast("GeneralDriver", driver).differentiate(method, design, result, rows.cones)
@@ -338,6 +336,26 @@ class Evaluator:
         work = work_named(driver.work.tolist())
         bodies = next(each.bodies for each in self.case.load_cases if each.name == load_case)
         return Trajectory.of(load_case, steps, status, message, work, border_of(self.case, bodies))
+
+    def trajectory_with_values(self, alpha: FloatArray, load_case: str) -> tuple[Trajectory, MotionValues]:
+        """The motion of one load case with the design alpha (N,), and what objectives and constraints of it come to:
+        values as of `evaluate`, from the same motion, which is computed once."""
+        trajectory = self.trajectory(alpha, load_case)
+        aims = self._by_load_case[load_case]
+        if not aims or not trajectory.status.ok:
+            return trajectory, MotionValues(trajectory.status, trajectory.message)
+        other = self._other_of(self.sensitivity, gradient=False)
+        if other is not None:  # values are those of the integrator that gradients have, as of `evaluate`
+            return trajectory, other.trajectory_with_values(alpha, load_case)[1]
+        if self._design_map is not None and (nowhere := self._design_map.why_not(False)):
+            return trajectory, MotionValues(Status.NON_FINITE, nowhere)
+        driver = self.driver(load_case)
+        result = driver.evaluate_simulated()
+        status, message = self._verdict(load_case, self.computed(self.design(alpha)), result)
+        if not status.usable:
+            return trajectory, MotionValues(status, message)
+        peaks = {key: _peaks(result, j, None, None, driver.shapes[j])[0] for j, key in enumerate(aims)}
+        return trajectory, MotionValues(status, message, peaks)
 
     def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and dg(t)/dalpha (T, N) of an objective's response at them, by `direct`.
@@ -511,7 +529,10 @@ class Evaluator:
         return self._coarse[name]
 
     def _verdict(self, name: str, design: FloatArray, result: ResponseResult) -> tuple[Status, str]:
-        """Why the motion of a load case cannot be trusted, and which member or joint is the cause."""
+        """The status of an evaluated load case, and where its motion cannot be trusted, which member or joint is the
+        cause."""
+        if result.status.ok and result.meeting < 0 and result.unresolved < 0:
+            return result.status, ""
         driver = self.driver(name)
         if result.message:
             return result.status, result.message

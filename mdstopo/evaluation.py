@@ -110,3 +110,15 @@ class Evaluation(NamedTuple):
 
     def _repr_html_(self) -> str:
         return html_of(self)
+
+
+class MotionValues(NamedTuple):
+    """What objectives and constraints of one load case come to, of one motion.
+
+    status, message: as of an `Evaluation`; a status that is not `usable` leaves no peaks. peaks: the highest by the
+    name of an objective, and by the key path of a constraint: `constraints[2]`.
+    """
+
+    status: Status
+    message: str
+    peaks: Mapping[str, Peak] = _NONE

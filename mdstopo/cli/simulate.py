@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdstopo.cli.long_motion import FIRST, told_while
+from mdstopo.cli.long_motion import told_while
 from mdstopo.cli.options import (
     alpha_option,
     announce_compilation,
@@ -29,6 +29,7 @@ from mdstopo.shown import counted
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, FloatArray
     from mdstopo.engine import Evaluator
+    from mdstopo.evaluation import MotionValues
     from mdstopo.integrators.trajectory import Trajectory
     from mdstopo.scene.settled import Settled
     from mdstopo.store.contents import Motion
@@ -84,13 +85,11 @@ def command(
         engine = Evaluator(case)
         check_design(engine, alpha, alpha_path)
         ready = time.perf_counter()
-        motions = _motions(output, case, engine, alpha, chosen)
+        motions, evaluated = _motions(output, case, engine, alpha, chosen)
         ended = time.perf_counter()
         rests = {name: engine.settled(alpha, name) for name in chosen}
         failed = [motion for motion in motions.values() if motion.status is not Status.OK]
-        if ended - ready > FIRST and not failed and (case.objectives or case.constraints):
-            output.notice(f"objectives and constraints: about {duration(ended - ready)} more")
-        values = Values({}, {}) if failed else values_of(case, engine, alpha, chosen)
+        values = Values({}, {}) if failed else values_of(case, engine.design(alpha), evaluated)
         status = RunStatus.FAILED if failed else RunStatus.CONVERGED
         reason = f"{failed[0].status.value}: {failed[0].message}" if failed else "done"
         file.write(
@@ -138,13 +137,15 @@ def _load_cases(case: "Case", names: tuple[str, ...]) -> list[str]:
 
 def _motions(
     output: Output, case: "Case", engine: "Evaluator", alpha: "FloatArray", names: list[str]
-) -> "dict[str, Trajectory]":
-    """The motion of each of these load cases; one that takes long says how far it is."""
-    motions = {}
+) -> "tuple[dict[str, Trajectory], list[MotionValues]]":
+    """The motion of each of these load cases, and what objectives and constraints of it come to; one that takes long
+    says how far it is."""
+    motions, evaluated = {}, []
     for name in names:
         with told_while(output.notice, case, engine, alpha, name):
-            motions[name] = engine.trajectory(alpha, name)
-    return motions
+            motions[name], values = engine.trajectory_with_values(alpha, name)
+        evaluated.append(values)
+    return motions, evaluated
 
 
 def _warn(output: Output, case: "Case", engine: "Evaluator", motions: "dict[str, Trajectory]") -> None:

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mdstopo.cli.output import number
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, FloatArray, ResponseRow, VolumeRow
-    from mdstopo.engine import Evaluator
+    from mdstopo.evaluation import MotionValues
 
 
 @dataclass(frozen=True)
@@ -25,33 +25,25 @@ class Values:
     failure: str = ""
 
 
-def values_of(case: "Case", engine: "Evaluator", design: "FloatArray", load_cases: Sequence[str]) -> Values:
-    """Values of what looks at these load cases, and of volumes, with a design (N + P,); of the case as it is written
-    where numbers are uncertain."""
-    from mdstopo.case.model import ResponseRow, VolumeRow
-    from mdstopo.engine import Evaluator
+def values_of(case: "Case", design: "FloatArray", evaluated: "Sequence[MotionValues]") -> Values:
+    """Values of what looks at the load cases that were simulated, and of volumes; of the case as it is written where
+    numbers are uncertain.
+
+    design (N + P,): the design. evaluated: of each of these load cases.
+    """
+    from mdstopo.case.model import VolumeRow
     from mdstopo.scene.moving_volumes import spent
 
-    design = engine.design(design)
-    stated = list(enumerate(case.constraints))
-    volumes = {i: spent(case, row, design) for i, row in stated if isinstance(row, VolumeRow)}
-    objectives = tuple(each for each in case.objectives if each.load_case in load_cases)
-    rows = {i: row for i, row in stated if isinstance(row, ResponseRow) and row.load_case in load_cases}
-    if not objectives and not rows:
-        return Values({}, volumes)
-    if set(load_cases) != {each.name for each in case.load_cases}:
-        engine = Evaluator(replace(case, objectives=objectives, constraints=tuple(rows.values())), in_background=False)
-        found = engine.evaluate(design, gradient=False)
-        excess = dict(zip(rows, found.constraints.tolist(), strict=True))
-    else:
-        found = engine.evaluate(design, gradient=False)
-        excess = {i: float(found.constraints[i]) for i in rows}
-    if not found.status.usable:
-        return Values({}, volumes, f"{found.status.value} {found.message}".rstrip())
-    constraints = volumes | {i: excess[i] + row.bound for i, row in rows.items()}
+    volumes = {i: spent(case, row, design) for i, row in enumerate(case.constraints) if isinstance(row, VolumeRow)}
+    for each in evaluated:
+        if not each.status.usable:
+            return Values({}, volumes, f"{each.status.value} {each.message}".rstrip())
+    peaks = {key: peak for each in evaluated for key, peak in each.peaks.items()}
+    objectives = {each.name: peaks[each.name] for each in case.objectives if each.name in peaks}
+    keys = {i: f"constraints[{i}]" for i in range(len(case.constraints))}
+    constraints = volumes | {i: peaks[key].value for i, key in keys.items() if key in peaks}
     return Values(
-        {each.name: (found.objectives[each.name], found.peak_times[each.name]) for each in objectives},
-        dict(sorted(constraints.items())),
+        {name: (peak.value, peak.time) for name, peak in objectives.items()}, dict(sorted(constraints.items()))
     )
 
 

@@ -72,7 +72,7 @@ class Driver:
         self.shapes: tuple[Shape, ...] = tuple("plain" for _ in reductions)
         self.strength = aligned((ROOMY, padded))
         self.found = np.zeros(count, dtype=np.int64)
-        #: steps of the last evaluation
+        #: steps of the last run
         self.count = 0
         self.meeting = np.full(3, -1, dtype=np.int64)
         self._width = padded
@@ -133,13 +133,20 @@ class Driver:
 
         Energies are no norms: `rows.cones` asks for nothing.
         """
+        code, self.count, time = self.run(alpha, gradient)
+        return self._evaluated(code, time, gradient, rows)
+
+    def evaluate_simulated(self) -> ResponseResult:
+        """Evaluate all objectives of the motion that `simulate` has computed (`SceneDriver`)."""
+        return self._evaluated(OK, self.room.item(self.count), False, USUAL)
+
+    def _evaluated(self, code: int, time: float, gradient: bool, rows: Rows) -> ResponseResult:
+        """The objectives of the run of `count` steps that has ended with a code at a time."""
         self.settings[3] = CLOSENESS if rows.window is None else rows.window
         if self.rows.shape[1] != (rows.most or ROWS):
             self._make_rows(rows.most or ROWS)
-        code, count, time = self.run(alpha, gradient)
-        self.count = count
         if code == OK:
-            self._evaluate_responses(count, gradient)
+            self._evaluate_responses(self.count, gradient)
         meeting, unresolved = self.meeting.item(0), self.meeting.item(2)
         return ResponseResult(
             status_of(code), time, self.rows, self.found, self.gradients, meeting, unresolved=unresolved
@@ -224,8 +231,8 @@ class Driver:
 
     def simulate(self, alpha: FloatArray) -> tuple[Status, "DenseSteps"]:
         """Simulate alpha (N,); the steps come back in arrays of their own."""
-        code, count, _ = self.run(alpha, False)
-        return status_of(code), DenseSteps(self, count)
+        code, self.count, _ = self.run(alpha, False)
+        return status_of(code), DenseSteps(self, self.count)
 
     def _dense_arguments(
         self,

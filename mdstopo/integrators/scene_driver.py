@@ -145,6 +145,10 @@ class SceneDriver(Protocol):
     def simulate(self, alpha: FloatArray) -> tuple[Status, Steps]:
         """Simulate a design; the steps come back in arrays of their own."""
 
+    def evaluate_simulated(self) -> ResponseResult:
+        """Evaluate all responses of the motion that `simulate` has computed, without gradients. It has to be the last
+        that was computed, and not to have failed."""
+
     def displacements(self, q: FloatArray) -> FloatArray:
         """(T, n_body, D): by how much bodies have moved and turned (m, rad) at q (T, n_q) since its first row."""
 

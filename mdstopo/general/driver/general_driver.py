@@ -174,6 +174,11 @@ class GeneralDriver:
         return self._values
 
     @property
+    def _design(self) -> FloatArray:
+        """(N + P,): the design that was last taken; a copy."""
+        return np.concatenate([self._alpha, self._values])
+
+    @property
     def entry(self) -> "Entries":
         """The method's compiled entries, imported when first used."""
         if self._entry is None:
@@ -257,36 +262,55 @@ class GeneralDriver:
 
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate alpha (N,) and evaluate all responses; `self.work` holds the counts of this call."""
+        code, count, time = self.run(alpha, gradient)
+        return self._evaluated(code, count, time, gradient, rows)
+
+    def evaluate_simulated(self) -> ResponseResult:
+        """Evaluate all responses of the motion that `simulate` has computed (`SceneDriver`)."""
+        return self._evaluated(OK, self.count, self.room.item(self.count), False, USUAL)
+
+    def _evaluated(self, code: int, count: int, time: float, gradient: bool, rows: Rows) -> ResponseResult:
+        """The responses of the last run.
+
+        code, count, time: how it ended, its number of steps, and the time that it has reached; where steps have to end
+        elsewhere for an integral, the same design is simulated again. gradient, rows: as of `evaluate`.
+        """
         if self.rows.shape[1] != (rows.most or ROWS):
             self._make_rows(rows.most or ROWS)
         window = CLOSENESS if rows.window is None else rows.window
         across = self._across() if rows.cones and gradient and self._is_planar else None
-        code, count, time = self.run(alpha, gradient)
         self.quadrature_breakpoints = []
         for _ in range(ROUNDS if self._integrated else 0):
             more = quadrature_breakpoints(self, count) if code == OK else []
             if not more:
                 break
             self.quadrature_breakpoints = self.quadrature_breakpoints + more
-            code, count, time = self.run(alpha, gradient, self.quadrature_breakpoints)
+            code, count, time = self.run(self._design, gradient, self.quadrature_breakpoints)
         self.jumps = {}
         status, message = status_of(code), self.rotation_jump(count) if code == OK else ""
         if message:
             status = Status.ROTATION_JUMP
         elif code == OK:
-            if gradient and self._plain_rows and across is None:
-                differentiated = self._find_rows_with_gradients(count, window)
-            else:
-                differentiated = False
-                for j, reduction in enumerate(self.scene.reductions):
-                    self._reduce_response(j, reduction, count, gradient, window)
-            if gradient and not differentiated:
-                self.row_gradients(count, across)
+            self._find_rows(count, gradient, window, across)
             status, message = self._without_value(gradient)
         grazing, meeting = self._grazing(), self.where.item(1)
         return ResponseResult(
             status, time, self.rows, self.found, self.gradients, meeting, grazing, across, message=message
         )
+
+    def _find_rows(self, count: int, gradient: bool, window: float, across: FloatArray | None) -> None:
+        """The rows of all responses of a run of so many steps, and on demand their gradients.
+
+        window: of competing peaks. across: as `gradients`, of `evaluation.Peak.across`, where it is asked for.
+        """
+        plain = gradient and self._plain_rows and across is None
+        if plain and self._find_rows_with_gradients(count, window):
+            return
+        if not plain:
+            for j, reduction in enumerate(self.scene.reductions):
+                self._reduce_response(j, reduction, count, gradient, window)
+        if gradient:
+            self.row_gradients(count, across)
 
     def _without_value(self, gradient: bool) -> tuple[Status, str]:
         """Whether responses have values, and those that are expressions gradients where wanted; which has none, and
@@ -664,7 +688,7 @@ class GeneralDriver:
 
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the design of the last run."""
-        return float(self.start_modes(np.concatenate([self._alpha, self._values])).frequencies.max(initial=0.0))
+        return float(self.start_modes(self._design).frequencies.max(initial=0.0))
 
     def start_modes(self, alpha: FloatArray) -> Modes:
         """Small motion about the start."""
