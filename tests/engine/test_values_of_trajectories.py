@@ -25,8 +25,11 @@ constraints:
 GENERAL = SPRINGS + "  - {response: {velocity: {body: mass, at: [0, 0], component: x}}, load_case: usual, limit: 2}\n"
 #: the speed has kinks where the mass turns round, where steps have to end for its integral
 INTEGRAL = GENERAL.replace(", component: x", "").replace("limit: 2", "limit: 2, over_time: integral")
-SETTLED = GENERAL.replace("bodies:", "gravity: [0.5, 0]\nsolver: {settle: true}\nbodies:").replace("mass, at: [1, 0]", "mass, at: [0.9, 0]")
-SETTLED = SETTLED.replace(", velocity: [1, 0]", "")
+SETTLED = (
+    GENERAL.replace("bodies:", "gravity: [0.5, 0]\nsolver: {settle: true}\nbodies:")
+    .replace("mass, at: [1, 0]", "mass, at: [0.9, 0]")
+    .replace(", velocity: [1, 0]", "")
+)
 ITERATIVE = GENERAL.replace("bodies:", "solver: {sensitivity: iterative}\nbodies:")
 
 
