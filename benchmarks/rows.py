@@ -152,7 +152,7 @@ def _sweeps(evaluator: Evaluator, load_case: str) -> list[str]:
         (j, *driver.rows[j, r])
         for j, reduction in enumerate(driver.scene.reductions)
         if not reduction.is_integral
-        for r in range(int(driver.found[j]))
+        for r in range(int(driver.row_counts[j]))
     ]
     times = [_seconds(_sweep(driver, count, known, rows)) for rows in ROWS]
     alone = [_sweep(driver, count, known[i % len(known) :], 1) for i in range(ROWS[-1])]

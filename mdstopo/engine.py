@@ -631,7 +631,7 @@ def _peaks(
     peaks: tuple[Peak, ...] = ()
     gradient = across_of_row = None
     rows = result.rows.item
-    for r in range(result.found.item(j)):
+    for r in range(result.row_counts.item(j)):
         if gradients is not None:
             gradient = gradients[j, r].copy()
             gradient.setflags(False)

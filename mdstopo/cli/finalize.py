@@ -129,7 +129,7 @@ def _say(output: Output, done: "Finalized", place: Path) -> None:
     output.say(f"{done.case.title or done.case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")
     if done.columns:
         rows = [["", *(column.title for column in done.columns)]]
-        found = [column.found for column in done.columns]
+        found = [column.evaluation for column in done.columns]
         names = [objective.name for objective in done.case.objectives]
         rows += [[name, *(number(each.objectives[name], 9) for each in found)] for name in names]
         for i, row in enumerate(done.case.constraints):
@@ -152,7 +152,7 @@ def _say(output: Output, done: "Finalized", place: Path) -> None:
 
 def _values(done: "Finalized") -> list[list[str]]:
     """The values of each variable in the four designs; of several the lowest and the highest."""
-    full = getattr(done.columns[0].found, "variables", {})
+    full = getattr(done.columns[0].evaluation, "variables", {})
     rows = []
     for each in done.case.variables:
         own = [found for found in done.values if found.name == each.name]
@@ -179,7 +179,7 @@ def _constraint(case: "Case", i: int) -> str:
 
 def _trouble(column: Any) -> str:
     """What is wrong with the motion of a design, or nothing."""
-    found = column.found
+    found = column.evaluation
     return "" if found.status.ok else f"{column.title}: {found.status.value}: {getattr(found, 'message', '')}"
 
 
@@ -193,7 +193,7 @@ def _why(done: "Finalized") -> str:
         return "the run was interrupted"
     if done.equilibria.lost:
         return f"{done.equilibria.lost}; keep more members"
-    if any(not column.found.status.usable for column in done.columns[-2:]):
+    if any(not column.evaluation.status.usable for column in done.columns[-2:]):
         return "the motion of its design cannot be computed"
     return "all members have alpha = 0"
 
@@ -208,9 +208,9 @@ def _document(done: "Finalized", place: Path) -> dict[str, Any]:
             {
                 "name": column.title,
                 "members": column.members,
-                "status": column.found.status.value,
-                "objectives": column.found.objectives,
-                "constraints": column.found.constraints,
+                "status": column.evaluation.status.value,
+                "objectives": column.evaluation.objectives,
+                "constraints": column.evaluation.constraints,
             }
             for column in done.columns
         ],

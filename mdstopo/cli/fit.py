@@ -103,7 +103,7 @@ def command(
             remove_leftovers(place)
             run = _fitted(case, place, _Asked(points, resume, overwrite, line), output, interrupts.stop_requested)
     found = content(read_result(path))
-    written = path.with_name(f"{case.name}.fitted.yaml") if run.found is not None else None
+    written = path.with_name(f"{case.name}.fitted.yaml") if run.minimum is not None else None
     if written is not None and picture_path is not None:
         _draw(path, picture_path)
     output.say(f"{case.title or case.name}: {run.status.replace('_', ' ')} - {run.reason}")
@@ -175,9 +175,9 @@ def _fitted(
 
     run_fit(problem, asked.points, run, save, stop, partial(save, urgent=False))
     text = None
-    if run.found is not None:
+    if run.minimum is not None:
         count = len(problem.numbers.keys)
-        numbers = dict(zip(problem.names[:count], run.found.x[:count].tolist(), strict=True))
+        numbers = dict(zip(problem.names[:count], run.minimum.x[:count].tolist(), strict=True))
         text = fitted_text(case, numbers, fitted_place)
     file.conclude(run, text, tuple(_remarks(run)))
     if text is not None:

@@ -187,7 +187,7 @@ class _Values:
         self.mode = arguments[1 + len(NAMES)]
         self.named = dict(zip(NAMES, named, strict=True))
         self.outside: dict[Expression, Any] = {}
-        self.found: dict[Expression, Any] = {}
+        self.values: dict[Expression, Any] = {}
         self.lowest_powers: dict[tuple[Expression, Expression], float] = {}
         self.shared: dict[Expression, Any] = {}
 
@@ -197,12 +197,12 @@ class _Values:
         self.note_powers(order)
         for part in order:
             if part.operator == NUMBER:
-                self.found[part] = self.constant(part.value)
+                self.values[part] = self.constant(part.value)
             elif part.operator == NAME:
-                self.found[part] = self.name(part.word)
+                self.values[part] = self.name(part.word)
             else:
-                self.found[part] = self.operation(part, [self.found[each] for each in part.operands])
-        return [self.found[each] for each in group]
+                self.values[part] = self.operation(part, [self.values[each] for each in part.operands])
+        return [self.values[each] for each in group]
 
     def constant(self, value: float) -> Any:
         """A number."""
@@ -287,7 +287,7 @@ class _Values:
         lowest = self.lowest_powers[base, core]
         key = operation("^", base, operation("+", core, number(lowest)))
         if key not in self.shared:
-            least = self.constant(core.value + lowest) if core.operator == NUMBER else self.found[core]
+            least = self.constant(core.value + lowest) if core.operator == NUMBER else self.values[core]
             if core.operator != NUMBER and lowest != 0.0:
                 least = self.build.fadd(least, self.constant(lowest))
             self.shared[key] = self.call("pow", [u[0], least])

@@ -45,11 +45,11 @@ SHORTER = 10.0
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table that compares designs: its name, how many members it has, and what was found."""
+    """A column of the table that compares designs: its name, how many members it has, and its evaluation."""
 
     title: str
     members: int
-    found: Evaluation
+    evaluation: Evaluation
 
 
 @dataclass(frozen=True)
@@ -232,11 +232,11 @@ def finalize(
 
 def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...]:
     """Sentences about objectives that are more than `WORSE` worse in the last column than in the first."""
-    if not columns or not all(columns[k].found.status.usable for k in (0, -1)):
+    if not columns or not all(columns[k].evaluation.status.usable for k in (0, -1)):
         return ()
     told = []
     for objective in case.objectives:
-        before, now = (columns[k].found.objectives[objective.name] for k in (0, -1))
+        before, now = (columns[k].evaluation.objectives[objective.name] for k in (0, -1))
         loss = (before - now if objective.sense == "maximize" else now - before) / abs(before) if before else 0.0
         if loss > WORSE:
             told.append(

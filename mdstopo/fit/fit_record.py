@@ -82,10 +82,10 @@ def _digests(problem: FitProblem) -> Datasets:
 
 def _motions(run: FitRun) -> dict[str, Any]:
     """The fitted motion in each load case with measurements."""
-    if run.found is None:
+    if run.minimum is None:
         return {}
     numbers = run.problem.numbers
-    evaluator = Evaluator(numbers.case_at(run.found.x[: len(numbers.keys)]), in_background=False)
+    evaluator = Evaluator(numbers.case_at(run.minimum.x[: len(numbers.keys)]), in_background=False)
     names = dict.fromkeys(each.load_case for each in run.problem.fit.series)
     return {name: evaluator.trajectory(evaluator.case.start, name) for name in names}
 

@@ -45,9 +45,9 @@ class Tried:
 class FitRun:
     """What is known of a fit so far.
 
-    starts: those that are done. trace: all evaluations of the starts. latest: the last of them. found, statistics: the
-    best, and its statistics; None where none has a motion, or before all starts are done. profiles: by the name of the
-    estimate. status: running | converged | max_iterations | failed | interrupted; reason: in words. simulations:
+    starts: those that are done. trace: all evaluations of the starts. latest: the last of them. minimum, statistics:
+    the best, and its statistics; None where none has a motion, or before all starts are done. profiles: by the name of
+    the estimate. status: running | converged | max_iterations | failed | interrupted; reason: in words. simulations:
     motions that were computed. concluded: whether the one at the minimum of these starts is among them.
     """
 
@@ -55,7 +55,7 @@ class FitRun:
     starts: list[Start] = field(default_factory=list)
     trace: list[Tried] = field(default_factory=list)
     latest: Evaluated | None = None
-    found: Minimum | None = None
+    minimum: Minimum | None = None
     statistics: Statistics | None = None
     profiles: dict[str, Profile] = field(default_factory=dict)
     status: str = "running"
@@ -66,9 +66,9 @@ class FitRun:
     @property
     def shown(self) -> Evaluated | None:
         """The state of the fit that is displayed: the minimum, or before there is one the last evaluation."""
-        if self.found is None:
+        if self.minimum is None:
             return self.latest
-        return Evaluated(self.found.x, self.found.misfit, self.found.deviation)
+        return Evaluated(self.minimum.x, self.minimum.misfit, self.minimum.deviation)
 
     @property
     def best(self) -> int:
@@ -101,7 +101,7 @@ def run_fit(
     """
     run = FitRun(problem) if before is None else before
     counted = problem.simulations  # of these motions of the problem
-    run.status, run.found, run.statistics = "running", None, None
+    run.status, run.minimum, run.statistics = "running", None, None
     run.trace = [each for each in run.trace if each.start < len(run.starts)]
 
     def count() -> None:
@@ -141,7 +141,7 @@ def run_fit(
         assert run.starts
         run.status, run.reason = run.starts[run.best].status, run.starts[run.best].reason
     except StoppedError:
-        if run.starts and run.found is None:
+        if run.starts and run.minimum is None:
             conclude()
         run.status, run.reason = "interrupted", "stopped on request; what is done is kept"
     count()
@@ -156,15 +156,15 @@ def _conclude(run: FitRun) -> None:
         return
     problem = run.problem
     at = minimum(problem, best.x, best.deviation, held=np.arange(len(best.x)))
-    run.found = at
+    run.minimum = at
     run.statistics = statistics(problem, at)
 
 
 def _profile(run: FitRun, name: str, points: int, stop: Callable[[], bool]) -> None:
-    assert run.found is not None
+    assert run.minimum is not None
     assert run.statistics is not None
     problem = run.problem
-    run.profiles[name] = profile(problem, run.found, run.statistics, problem.names.index(name), points, stop)
+    run.profiles[name] = profile(problem, run.minimum, run.statistics, problem.names.index(name), points, stop)
 
 
 def _unprofiled(run: FitRun, points: int) -> list[str]:

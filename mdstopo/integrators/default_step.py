@@ -76,7 +76,7 @@ def _run(driver: SceneDriver, alpha: FloatArray, step: float) -> _Run | None:
         if result.status is not Status.OK:
             return None
         rows = []
-        for j, count in enumerate(result.found.tolist()):
+        for j, count in enumerate(result.row_counts.tolist()):
             values = result.rows[j, :count]
             rows.append((values[:, 0].copy(), values[:, 1].copy(), result.gradients[j, :count].copy()))
         return _Run(np.zeros(0), np.zeros((0, 0, 0)), tuple(rows))

@@ -71,7 +71,7 @@ class Driver:
         #: how the values come from what they are formed of (`evaluation.Peak`)
         self.shapes: tuple[Shape, ...] = tuple("plain" for _ in reductions)
         self.strength = aligned((ROOMY, padded))
-        self.found = np.zeros(count, dtype=np.int64)
+        self.row_counts = np.zeros(count, dtype=np.int64)
         #: steps of the last run
         self.count = 0
         self.meeting = np.full(3, -1, dtype=np.int64)
@@ -149,7 +149,7 @@ class Driver:
             self._evaluate_responses(self.count, gradient)
         meeting, unresolved = self.meeting.item(0), self.meeting.item(2)
         return ResponseResult(
-            status_of(code), time, self.rows, self.found, self.gradients, meeting, unresolved=unresolved
+            status_of(code), time, self.rows, self.row_counts, self.gradients, meeting, unresolved=unresolved
         )
 
     def met(self, count: int) -> int:
@@ -226,7 +226,7 @@ class Driver:
         return (
             self.entry.TAG, self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped,
             self.settings, self.limits, count, self.reductions, gradient, self.room, self.room_ints, self.strength,
-            self.padded, self.rows, self.found, self.gradients, self.meeting, self.work,
+            self.padded, self.rows, self.row_counts, self.gradients, self.meeting, self.work,
         )  # fmt: skip
 
     def simulate(self, alpha: FloatArray) -> tuple[Status, "DenseSteps"]:

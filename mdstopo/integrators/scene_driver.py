@@ -50,17 +50,18 @@ class Compiling(Protocol):
 class ResponseResult(NamedTuple):
     """What one call of `SceneDriver.evaluate` found; arrays are views that the next call overwrites.
 
-    rows (n_obj, R, 4 or more): time, value, step, fraction, and what else the family keeps of a row; found (n_obj,):
-    how many rows hold; gradients (n_obj, R, N); meeting: padded index of a member whose ends meet, or -1. grazing: of
-    one that leaves no derivative, or -1. across: as gradients, of `evaluation.Peak.across`, where it was asked for;
-    rows of responses without one are zero. unresolved: of a member whose stored energy has no digits, or -1. message:
-    who is to blame where a response cannot be evaluated although the motion is right.
+    rows (n_obj, R, 4 or more): time, value, step, fraction, and what else the family keeps of a row.
+    row_counts (n_obj,): how many rows of each response hold. gradients (n_obj, R, N): of these.
+    meeting: padded index of a member whose ends meet, or -1. grazing: of one that leaves no derivative, or -1.
+    unresolved: of a member whose stored energy has no digits, or -1.
+    across: as gradients, of `evaluation.Peak.across`, where it was asked for; rows of responses without one are zero.
+    message: who is to blame where a response cannot be evaluated although the motion is right.
     """
 
     status: Status
     time: float
     rows: FloatArray
-    found: IndexArray
+    row_counts: IndexArray
     gradients: FloatArray
     meeting: int
     grazing: int = -1

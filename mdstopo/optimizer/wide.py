@@ -104,7 +104,7 @@ class Kept(Generic[T]):
 class Room:
     """Arrays for `wide_minimum`, kept from one step to the next: new memory takes longer to get than to fill.
 
-    slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,). made: the step of which found and counts tell who
+    slots (SLOTS, N), place, listed (N,), counts (2, pieces), x (N,). made: the step of which listed and counts tell who
     may have moved, or None. signs: two of (N/32,), because `wide_shift_few` reads the last step's while it writes this
     one's; signed: the step of which the first tell, or None.
     """
@@ -121,8 +121,8 @@ class Room:
             self._who = _thin(n), np.empty((2, -(-n // PIECE)), dtype=np.int64)
             self.signs = np.empty(-(-n // 32), dtype=np.int64), np.empty(-(-n // 32), dtype=np.int64)
             self._take()
-        (slots, place, x), (found, counts) = self._slots, self._who
-        return slots, place, found, counts, x
+        (slots, place, x), (listed, counts) = self._slots, self._who
+        return slots, place, listed, counts, x
 
     def used(self, count: int) -> None:
         """Note how many slots were used; where that is much memory it is freed."""
@@ -189,10 +189,10 @@ def propose(state: GsaoState, chosen: Indices, measures: Measures, settings: Set
     left = float(measures.excess(alpha)[0])
     room = measures.room
     room.made = None
-    trial, (slots, place, found, counts, x) = np.empty(n), room.of(n)
+    trial, (slots, place, listed, counts, x) = np.empty(n), room.of(n)
     multiplier, miss, size, change, residual, plain, scaled, count = wide_minimum(
         alpha, slope, cost, state.shift.array(), lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
-        _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), threads_for(n), trial, slots, place, found, counts, x,
+        _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), threads_for(n), trial, slots, place, listed, counts, x,
     )  # fmt: skip
     room.used(count)
     if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > SOLVED * size and multiplier != 0.0):
@@ -252,7 +252,7 @@ def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room
     """The next distances of the shifts, as `safeguards.next_shift`, from those that moved where these are known."""
     made, n = room.made == step, len(step.to)
     known = made and room.signed == last and shift.within == rule.within
-    _, _, moves, counts, _ = room.of(n)  # what was found has become what moves in `measure`
+    _, _, moves, counts, _ = room.of(n)  # what was listed has become what moves in `measure`
     if known:
         # NumPy's sum takes several times as long after an evaluation, which has displaced its code from the caches
         shifts, array, places, before, count = shift.following(sum(counts[1].tolist()))

@@ -78,7 +78,7 @@ def _weighted(
 @vector_entry
 def sort(
     pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
-    limits: Floats, threads: int, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
+    limits: Floats, threads: int, classes: Bools, listed: Ints, counts: Ints, sums: Floats, products: Floats,
 ) -> None:  # fmt: skip
     """Decide for each variable whether given multipliers move it to an end of its box or inside; in doubt where they
     are too uncertain.
@@ -95,7 +95,7 @@ def sort(
       threads: how many work.
     Out:
       classes (2, N): what each variable does, as `INSIDE` and `BEYOND` have it.
-      found (N,): from each piece's place on, its variables in doubt.
+      listed (N,): from each piece's place on, its variables in doubt.
       counts (pieces,): how many these are.
       sums (R,): Q d over the variables at an end of their box, d their steps.
       products (R, R): Q diag(1/h) Q' over those inside.
@@ -106,7 +106,7 @@ def sort(
     counter = np.zeros(1, np.int64)
     shared(
         _sorted, threads,
-        (counter, pool, rows, theta, spread, x, lower, upper, unit, limits, classes, found, counts, every_sum,
+        (counter, pool, rows, theta, spread, x, lower, upper, unit, limits, classes, listed, counts, every_sum,
          every_product),
     )  # fmt: skip
     sums.fill(0.0)
@@ -121,7 +121,7 @@ def sort(
 @kernel
 def _sorted(
     counter: Ints, pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats,
-    unit: Floats, limits: Floats, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
+    unit: Floats, limits: Floats, classes: Bools, listed: Ints, counts: Ints, sums: Floats, products: Floats,
 ) -> None:  # fmt: skip
     """What `sort` does with the pieces of variables that this thread takes.
 
@@ -137,7 +137,7 @@ def _sorted(
     Out:
       counter (1,): the next piece that nobody has taken.
       classes (2, N): what each variable does, as `INSIDE` and `BEYOND` have it.
-      found (N,): from each piece's place on, its variables in doubt.
+      listed (N,): from each piece's place on, its variables in doubt.
       counts (pieces,): how many these are.
       sums (pieces, R): of each piece, Q d over the variables at an end of their box, added to.
       products (pieces, R, R): of each piece, Q diag(1/h) Q' over those inside, added to.
@@ -174,7 +174,7 @@ def _sorted(
                     slack, within = 1.0 / h[i], True
                 else:
                     within, beyond = True, True
-                    found[place] = start + i
+                    listed[place] = start + i
                     place += 1
                 classes[INSIDE, start + i] = within
                 classes[BEYOND, start + i] = beyond
@@ -197,7 +197,7 @@ def _sorted(
 @vector_entry
 def finish(
     pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats, limits: Floats,
-    threads: int, classes: Bools, trial: Floats, found: Ints, counts: Ints, sums: Floats,
+    threads: int, classes: Bools, trial: Floats, listed: Ints, counts: Ints, sums: Floats,
 ) -> float:  # fmt: skip
     """Move all variables to where the final multipliers have them, and find those that contradict what was assumed
     of them.
@@ -214,7 +214,7 @@ def finish(
       classes (2, N): what each variable was assumed to do, as `INSIDE` and `BEYOND` have it.
     Out:
       trial (N,): the designs; that of variables in doubt is read, not changed.
-      found (N,): from each piece's place on, its variables that do something else than `classes` say.
+      listed (N,): from each piece's place on, its variables that do something else than `classes` say.
       counts (pieces,): how many these are.
       sums (R,): Q d, d the steps.
 
@@ -225,7 +225,7 @@ def finish(
     counter = np.zeros(1, np.int64)
     shared(
         _finished, threads,
-        (counter, pool, rows, theta, x, lower, upper, unit, limits, classes, trial, found, counts, every),
+        (counter, pool, rows, theta, x, lower, upper, unit, limits, classes, trial, listed, counts, every),
     )  # fmt: skip
     sums.fill(0.0)
     curved = 0.0
@@ -239,7 +239,7 @@ def finish(
 @kernel
 def _finished(
     counter: Ints, pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
-    limits: Floats, classes: Bools, trial: Floats, found: Ints, counts: Ints, sums: Floats,
+    limits: Floats, classes: Bools, trial: Floats, listed: Ints, counts: Ints, sums: Floats,
 ) -> None:  # fmt: skip
     """What `finish` does with the pieces of variables that this thread takes.
 
@@ -255,7 +255,7 @@ def _finished(
     Out:
       counter (1,): the next piece that nobody has taken.
       trial (N,): the designs; that of variables in doubt is read, not changed.
-      found (N,): from each piece's place on, its variables that do something else than `classes` say.
+      listed (N,): from each piece's place on, its variables that do something else than `classes` say.
       counts (pieces,): how many these are.
       sums (pieces, R + 1): of each piece, Q d and sum_i h_i d_i^2, added to.
     """
@@ -284,15 +284,15 @@ def _finished(
                     step = low[i]
                 elif least >= 0.0:
                     step, other = low[i], within or beyond
-                    found[place] = start + i
+                    listed[place] = start + i
                     place += 1 if other else 0
                 elif most <= 0.0:
                     step, other = high[i], within or not beyond
-                    found[place] = start + i
+                    listed[place] = start + i
                     place += 1 if other else 0
                 else:
                     step = -r[i] / h[i]
-                    found[place] = start + i
+                    listed[place] = start + i
                     place += 0 if within else 1
                 y[i] = min(max(at[i] + step, first[i]), last[i])
                 r[i] = step

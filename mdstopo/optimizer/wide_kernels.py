@@ -113,7 +113,7 @@ def _estimate(
 def wide_minimum(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
     bound: float, at_iterate: float, equal: bool, steepest: float, stride: int, rounding: float, threads: int,
-    out: Floats, slots: Floats, place: Ints, found: Ints, counts: Ints, x: Floats,
+    out: Floats, slots: Floats, place: Ints, listed: Ints, counts: Ints, x: Floats,
 ) -> tuple[float, float, float, float, float, float, float, int]:  # fmt: skip
     """Minimise the approximation of one row in its box under a x <= bound or a x = bound.
 
@@ -136,7 +136,7 @@ def wide_minimum(
     Out:
       out (N,): the minimiser.
       slots (SLOTS, N), place (N,), x (N,): the variables that were not decided at once, in the first columns.
-      found (N,): from each piece's place on, who does not rest, as `measure` tells it.
+      listed (N,): from each piece's place on, who does not rest, as `measure` tells it.
       counts (2, pieces): how many of each piece were in doubt, and how many do not rest.
 
     Returns the multiplier, what is left of the row, the size of its sums, the change of the model, what `measure`
@@ -161,7 +161,7 @@ def wide_minimum(
         if attempt == ATTEMPTS - 1:
             near, far = least, BEYOND
         n, total, size, change = fix_by_bracket(
-            alpha, slope, cost, shift, lower, upper, limits, near, far, threads, out, slots, place, found, counts
+            alpha, slope, cost, shift, lower, upper, limits, near, far, threads, out, slots, place, listed, counts
         )
         ends = bracket_slots(slots, n, power, room, whole)
         goal = bound - total
@@ -187,7 +187,7 @@ def wide_minimum(
         out[place[k]] = x[k]
     change += promise(slots, n, x, power, room, whole)
     residual, plain, scaled = measure(
-        alpha, slope, cost, lower, upper, multiplier, steepest, threads, out, found, counts
+        alpha, slope, cost, lower, upper, multiplier, steepest, threads, out, listed, counts
     )
     return multiplier, miss, size, change, residual, plain, scaled, n
 

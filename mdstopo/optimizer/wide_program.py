@@ -82,10 +82,10 @@ class Region(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Arrays for one pass after another: classes (2, N), found (N,), counts (pieces,)."""
+    """Arrays for one pass after another: classes (2, N), listed (N,), counts (pieces,)."""
 
     classes: Bools
-    found: Ints
+    listed: Ints
     counts: Ints
 
     @classmethod
@@ -94,10 +94,10 @@ class Room(NamedTuple):
         pieces = -(-n // PIECE)
         return cls(np.zeros((2, n), dtype=np.bool_), np.zeros(n, dtype=np.int64), np.zeros(pieces, dtype=np.int64))
 
-    def listed(self) -> Ints:
-        """The variables that the last pass has found, in order."""
+    def variables(self) -> Ints:
+        """The variables that the last pass has listed, in order."""
         counts = self.counts.tolist()
-        return np.concatenate([self.found[k * PIECE : k * PIECE + count] for k, count in enumerate(counts)])
+        return np.concatenate([self.listed[k * PIECE : k * PIECE + count] for k, count in enumerate(counts)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,9 +214,9 @@ def solve(program: WideProgram, room: Room) -> WideSolution:
         trial[few.which] = _ends(region, few, found.d)
         curved = finish(
             program.pool, program.places, found.theta, *region[:4], region.limits, threads_for(n), room.classes, trial,
-            room.found, room.counts, change,
+            room.listed, room.counts, change,
         )  # fmt: skip
-        others = room.listed()
+        others = room.variables()
         if not len(others) or not found.solved:
             break
         if len(others) > AGAIN * n and attempt < ROUNDS // 2:
@@ -275,9 +275,9 @@ def _doubtful(program: WideProgram, guess: Guess, room: Room) -> tuple[Few, Floa
     sums, inside = np.empty(len(guess.theta)), np.empty((len(guess.theta), len(guess.theta)))
     sort(
         program.pool, program.places, guess.theta, guess.spread, *region[:4], limits, threads_for(len(region.x)),
-        room.classes, room.found, room.counts, sums, inside,
+        room.classes, room.listed, room.counts, sums, inside,
     )  # fmt: skip
-    few = _some(program, room.listed())
+    few = _some(program, room.variables())
     met = np.abs(guess.theta)
     while len(few.which) > FEW:
         n = len(few.which)

@@ -55,10 +55,10 @@ def box(
 
 
 @member_kernel
-def chosen(mark: Floats, n: int, found: Ints) -> int:
-    """Write into `found` which of the first n marks are below zero, in order; how many.
+def chosen(mark: Floats, n: int, listed: Ints) -> int:
+    """Write into `listed` which of the first n marks are below zero, in order; how many.
 
-    Both have room for n rounded up to vectors. What is found is filled up to whole vectors with the last of it.
+    Both have room for n rounded up to vectors. The list is filled up to whole vectors with the last of it.
     """
     for k in range(n, whole_vectors(n)):
         mark[k] = 0.0
@@ -67,10 +67,10 @@ def chosen(mark: Floats, n: int, found: Ints) -> int:
         bits = negative(load(mark, k))
         if bits:
             for j in range(lanes()):
-                found[count] = k + j
+                listed[count] = k + j
                 count += (bits >> j) & 1
     for k in range(count, whole_vectors(count)):
-        found[k] = found[count - 1]
+        listed[k] = listed[count - 1]
     return count
 
 

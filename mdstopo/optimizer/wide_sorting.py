@@ -35,7 +35,7 @@ def one(x: Floats, n: int, i: int) -> float:
 @kernel
 def fix_by_bracket(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
-    near: float, far: float, threads: int, out: Floats, slots: Floats, place: Ints, found: Ints, counts: Ints,
+    near: float, far: float, threads: int, out: Floats, slots: Floats, place: Ints, listed: Ints, counts: Ints,
 ) -> tuple[int, float, float, float]:  # fmt: skip
     """Decide the variables for which all multipliers of a bracket give the same end of the box; slots for the others.
 
@@ -51,7 +51,7 @@ def fix_by_bracket(
     Out:
       out (N,): where the decided variables end.
       slots (SLOTS, n), place (n,): the variables in doubt, as in `wide_slots`; room for N.
-      found (N,): from each piece's place on, its variables in doubt, then the others that do not rest.
+      listed (N,): from each piece's place on, its variables in doubt, then the others that do not rest.
       counts (2, pieces): how many are in doubt, and how many do not rest.
 
     Returns how many slots there are and, over the decided variables, the sums of a x and |a x| and the change of the
@@ -63,7 +63,7 @@ def fix_by_bracket(
     counter = np.zeros(2, np.int64)
     shared(
         _sort_pieces, threads,
-        (counter[:1], alpha, slope, cost, shift, lower, upper, limits, near, far, out, found, sums, counts),
+        (counter[:1], alpha, slope, cost, shift, lower, upper, limits, near, far, out, listed, sums, counts),
     )  # fmt: skip
     n: int = np.int64(0)  # type: ignore[assignment]  # a 0 as written has its callees compiled once more, for that type
     held, size, change = 0.0, 0.0, 0.0
@@ -76,7 +76,7 @@ def fix_by_bracket(
     begin[count] = n
     shared(
         _slot_pieces, threads if n > CROWD else 1,
-        (counter[1:], alpha, slope, cost, shift, lower, upper, limits, found, begin, slots, place),
+        (counter[1:], alpha, slope, cost, shift, lower, upper, limits, listed, begin, slots, place),
     )  # fmt: skip
     return n, held, size, change
 
@@ -84,7 +84,7 @@ def fix_by_bracket(
 @kernel
 def _sort_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
-    limits: Floats, near: float, far: float, out: Floats, found: Ints, sums: Floats, counts: Ints,
+    limits: Floats, near: float, far: float, out: Floats, listed: Ints, sums: Floats, counts: Ints,
 ) -> None:  # fmt: skip
     """What `fix_by_bracket` does with the pieces of variables that this thread takes, before there are slots.
 
@@ -99,7 +99,7 @@ def _sort_pieces(
     Out:
       counter (1,): the next piece that nobody has taken.
       out (N,): where the decided variables end.
-      found (N,): from each piece's place on, its variables in doubt, then the others that do not rest.
+      listed (N,): from each piece's place on, its variables in doubt, then the others that do not rest.
       sums (pieces, 3): of each piece's decided variables the change of the model, the sum of a x and that of |a x|.
       counts (2, pieces): how many are in doubt, and how many do not rest.
     """
@@ -116,7 +116,7 @@ def _sort_pieces(
         for k in range(0, moving, BLOCK):
             _sort_block(
                 c, s, a, shift[start:stop], low, high, limits, near, far, which[k : k + BLOCK], min(moving - k, BLOCK),
-                room, whole, y, start, found[start:stop], places, sums[piece],
+                room, whole, y, start, listed[start:stop], places, sums[piece],
             )  # fmt: skip
         counts[0, piece], counts[1, piece] = places[0], moving
         piece = taken(counter)
@@ -177,7 +177,7 @@ def _moving(
 @member_kernel
 def _sort_block(
     c: Floats, s: Floats, a: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats, near: float,
-    far: float, which: Ints, moving: int, room: Floats, whole: Ints, y: Floats, start: int, found: Ints, places: Ints,
+    far: float, which: Ints, moving: int, room: Floats, whole: Ints, y: Floats, start: int, listed: Ints, places: Ints,
     sums: Floats,
 ) -> None:  # fmt: skip
     """Decide a block of those variables of a piece that do not rest.
@@ -194,8 +194,8 @@ def _sort_block(
       which (BLOCK,): the block's variables, counted from the piece's first; filled up to whole vectors with the last.
       room (_ROOM, ROW), whole (WHOLE, ROW): numbers and integers to work with.
       y (m,): the end of the box to which each of them would go.
-      found (m,): the variables in doubt from the front, the decided ones from behind.
-      places (2,): where in `found` the next one in doubt goes, and one more than where the next decided one goes.
+      listed (m,): the variables in doubt from the front, the decided ones from behind.
+      places (2,): where in `listed` the next one in doubt goes, and one more than where the next decided one goes.
       sums (3,): of the decided ones the change of the model, the sum of a x and that of |a x|, added to.
     """
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
@@ -234,7 +234,7 @@ def _sort_block(
         i = which[k]
         y[i] = end[k]
         # written at both ends, of which one is kept: a branch here would often be taken wrongly
-        found[doubt], found[others - 1] = start + i, start + i
+        listed[doubt], listed[others - 1] = start + i, start + i
         doubt += 1 if known[k] == 0.0 else 0
         others -= 0 if known[k] == 0.0 else 1
     places[0], places[1] = doubt, others
@@ -246,7 +246,7 @@ def _sort_block(
 @kernel
 def _slot_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
-    limits: Floats, found: Ints, begin: Ints, slots: Floats, place: Ints,
+    limits: Floats, listed: Ints, begin: Ints, slots: Floats, place: Ints,
 ) -> None:  # fmt: skip
     """Slots for the variables in doubt, of the pieces that this thread takes.
 
@@ -257,7 +257,7 @@ def _slot_pieces(
       limits (5,): exponent xi; longest step; trust box in ranges; share of a shift's distance; kappa times range.
     In:
       alpha (N,): the iterate.
-      found (N,): from each piece's place on, its variables in doubt.
+      listed (N,): from each piece's place on, its variables in doubt.
       begin (pieces + 1,): the first slot of each piece, and how many there are in all.
     Out:
       counter (1,): the next piece that nobody has taken.
@@ -268,7 +268,7 @@ def _slot_pieces(
     piece = taken(counter)
     while piece < len(begin) - 1:
         for n in range(begin[piece], begin[piece + 1]):
-            i = found[piece * PIECE + n - begin[piece]]
+            i = listed[piece * PIECE + n - begin[piece]]
             end, other, a = one(lower, N, i), one(upper, N, i), one(cost, N, i)
             low, high, reach, span = box(alpha[i], end, other, shift[i], move, trust, share)
             enter_slot(slots, place, n, i, alpha[i], slope[i], a, low, high, reach, convex / span)
@@ -278,7 +278,7 @@ def _slot_pieces(
 @kernel
 def measure(
     alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float, steepest: float,
-    threads: int, out: Floats, found: Ints, counts: Ints,
+    threads: int, out: Floats, listed: Ints, counts: Ints,
 ) -> tuple[float, float, float]:  # fmt: skip
     """The KKT residual and the largest changes, of the variables that do not rest, which are all that can tell.
 
@@ -293,7 +293,7 @@ def measure(
       out (N,): the new design.
       counts (2, pieces): in the second row, how many variables of each piece do not rest.
     Out:
-      found (N,): from each piece's place on, these variables; becomes four times each, and 1 if it rises, 2 if it
+      listed (N,): from each piece's place on, these variables; becomes four times each, and 1 if it rises, 2 if it
         falls.
 
     Returns max |x - clip(x - (slope + multiplier cost)/steepest)|, at most what a step along -gradient moves, x being
@@ -307,7 +307,7 @@ def measure(
     counter = np.zeros(1, np.int64)
     shared(
         _measure_pieces, threads if moving > CROWD else 1,
-        (counter, alpha, slope, cost, lower, upper, multiplier, 1.0 / steepest, out, found, counts, most),
+        (counter, alpha, slope, cost, lower, upper, multiplier, 1.0 / steepest, out, listed, counts, most),
     )  # fmt: skip
     residual, plain, scaled = 0.0, 0.0, 0.0
     for piece in range(count):
@@ -319,7 +319,7 @@ def measure(
 @kernel
 def _measure_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float,
-    unit: float, out: Floats, found: Ints, counts: Ints, most: Floats,
+    unit: float, out: Floats, listed: Ints, counts: Ints, most: Floats,
 ) -> None:  # fmt: skip
     """What `measure` does with the pieces of variables that this thread takes.
 
@@ -334,7 +334,7 @@ def _measure_pieces(
       counts (2, pieces): in the second row, how many variables of each piece do not rest.
     Out:
       counter (1,): the next piece that nobody has taken.
-      found (N,): from each piece's place on, these variables; becomes four times each, and 1 if it rises, 2 if it
+      listed (N,): from each piece's place on, these variables; becomes four times each, and 1 if it rises, 2 if it
         falls.
       most (pieces, 3): of each piece, the residual, the largest change, and that in ranges.
     """
@@ -343,12 +343,12 @@ def _measure_pieces(
     while piece < len(most):
         residual, plain, scaled = 0.0, 0.0, 0.0
         for k in range(piece * PIECE, piece * PIECE + counts[1, piece]):
-            i = found[k]
+            i = listed[k]
             x, low, high = alpha[i], one(lower, N, i), one(upper, N, i)
             moved = x - (slope[i] + multiplier * one(cost, N, i)) * unit
             step = out[i] - x
             change = abs(step)
-            found[k] = 4 * i + (1 if step > 0.0 else (2 if step < 0.0 else 0))
+            listed[k] = 4 * i + (1 if step > 0.0 else (2 if step < 0.0 else 0))
             residual = max(residual, abs(x - max(low, min(high, moved))))
             plain = max(plain, change)
             scaled = max(scaled, change / (high - low if high > low else 1.0))

@@ -62,7 +62,7 @@ def evaluate_responses(
     strength,
     padded,
     rows,
-    found,
+    row_counts,
     gradients,
     meeting,
     work,
@@ -85,7 +85,7 @@ def evaluate_responses(
       strength (3 or more, M_padded): as the run left them (N/m, N s/m, N).
     Out:
       rows (n_obj, R, 4): time (s), value, step, fraction of it.
-      found (n_obj,): how many rows each objective has.
+      row_counts (n_obj,): how many rows each objective has.
       gradients (n_obj, R, N): by alpha.
       meeting (3,): of `find_meeting` and `find_unresolved`.
       work (WORK,): counts of work, added to.
@@ -104,12 +104,12 @@ def evaluate_responses(
     find_unresolved(model, strength, steps, count, pose, len(tag) == len(GAUSS), max(VISIBLE, settings[0]), meeting)
     accuracy = solved_to(settings[0], settings[2])
     for j in range(reductions.shape[0]):
-        found[j] = energy_rows(
+        row_counts[j] = energy_rows(
             model, motion, tables, own, steps, count, pose, damped, reductions[j], settings[3], gradient, accuracy,
             rows[j], padded, work,
         )  # fmt: skip
         if gradient:
-            for r in range(found[j]):
+            for r in range(row_counts[j]):
                 unscale_gradient(model, alpha, padded[r], gradients[j, r])
     work[SPRINGS] += left * work[FORCES]
 

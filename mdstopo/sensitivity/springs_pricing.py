@@ -79,7 +79,7 @@ def pricing_states_of(driver: "SpringsDriver", factor: FloatArray) -> SpringPric
         point, weight = np.zeros((more, n_pair, POSE)), np.zeros(more)
         poses, points = kernels.row_poses(
             driver.entry.TAG, driver.packed.ints, driver.packed.floats, driver.method.tables, damped, driver.settings,
-            driver.limits, driver.count, driver.reductions, driver.rows, driver.found, factor, driver.room,
+            driver.limits, driver.count, driver.reductions, driver.rows, driver.row_counts, factor, driver.room,
             driver.room_ints, driver.strength, stages, pose, change, point, weight, np.zeros(WORK, dtype=np.int64),
         )  # fmt: skip
         if poses != NO_ROOM:

@@ -106,7 +106,7 @@ class Node:
 
 
 @dataclass
-class Found:
+class SearchProgress:
     """What the search has found up to now.
 
     choice (k,), x (n,), objective: the best; None and infinite before there is one. nodes, evaluations: so far.
@@ -166,7 +166,7 @@ class SizeSearch:
         self._rows = rows_for_sizes(problem.linear, catalogued)
         self._problem = problem
         self._others = np.setdiff1d(np.flatnonzero(problem.upper > problem.lower), catalogued.place)
-        self.found = Found()
+        self.progress = SearchProgress()
         k = len(catalogued.place)
         last = np.array([len(sizes) - 1 for sizes in catalogued.sizes], dtype=np.int64)
         self._open = [Node(float("-inf"), 0, np.zeros(k, dtype=np.int64), last, x.copy())]
@@ -179,32 +179,32 @@ class SizeSearch:
 
     # -- the search
 
-    def run(self, stop: Callable[[], bool], keep: Callable[[Found], None]) -> Found:
+    def run(self, stop: Callable[[], bool], keep: Callable[[SearchProgress], None]) -> SearchProgress:
         """Search on until nothing is left, or stop() says so; keep sees what has been found after each node."""
-        found = self.found
+        progress = self.progress
         if self._catalogued.choices <= FEW and not len(self._others):
             self._try_all(stop)
-        while self._open and not found.exhaustive and not stop() and self._counts[0] < MOST_EVALUATIONS:
+        while self._open and not progress.exhaustive and not stop() and self._counts[0] < MOST_EVALUATIONS:
             node = heapq.heappop(self._open)
             if node.bound < self._cutoff():
                 self._branch(node)
-                found.nodes += 1
+                progress.nodes += 1
             self._update()
-            keep(found)
-        if not self._open and not found.exhaustive and not self._refined:
+            keep(progress)
+        if not self._open and not progress.exhaustive and not self._refined:
             self._refined = self._refine(stop)
         self._update()
-        keep(found)
-        return found
+        keep(progress)
+        return progress
 
     def _update(self) -> None:
-        self.found.evaluations = self._counts[0]
+        self.progress.evaluations = self._counts[0]
         least = min((node.bound for node in self._open), default=float("inf"))
-        self.found.finished = not self._open and (self._refined or self.found.exhaustive)
-        self.found.bound = min(least, self.found.objective)
+        self.progress.finished = not self._open and (self._refined or self.progress.exhaustive)
+        self.progress.bound = min(least, self.progress.objective)
 
     def _cutoff(self) -> float:
-        best = self.found.objective
+        best = self.progress.objective
         return best - self._tolerance * abs(best) if np.isfinite(best) else best
 
     def _try_all(self, stop: Callable[[], bool]) -> None:
@@ -214,7 +214,7 @@ class SizeSearch:
                 return
             self._try(np.array(choice, dtype=np.int64), self._start)
         self._open = []
-        self.found.exhaustive = True
+        self.progress.exhaustive = True
 
     def _branch(self, node: Node) -> None:
         """Solve the relaxation of a node, try what is near its optimum, and open what is behind it."""
@@ -381,9 +381,9 @@ class SizeSearch:
         if violation > self._tolerance:
             return False
         self._known[key] = float(value)
-        if not value < self.found.objective:
+        if not value < self.progress.objective:
             return False
-        self.found.choice, self.found.x, self.found.objective = choice.copy(), there, float(value)
+        self.progress.choice, self.progress.x, self.progress.objective = choice.copy(), there, float(value)
         return True
 
     def _refine(self, stop: Callable[[], bool]) -> bool:
@@ -397,7 +397,8 @@ class SizeSearch:
                 for choice in self._neighbours(at):
                     if stop():
                         return False
-                    self.found.exchanged |= self._try(choice, self._start if self.found.x is None else self.found.x)
+                    start = self._start if self.progress.x is None else self.progress.x
+                    self.progress.exchanged |= self._try(choice, start)
                     there = self._known.get(tuple(choice.tolist()), float("inf"))
                     if there < least:
                         at, least, improved = choice, there, True
@@ -420,10 +421,11 @@ class SizeSearch:
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Everything that a later process needs to go on, by name."""
-        found, k, n = self.found, len(self._catalogued.place), len(self._start)
+        progress, k, n = self.progress, len(self._catalogued.place), len(self._start)
         nodes = sorted(self._open)
         numbers = (
-            found.objective, found.nodes, self._counts[0], self._made, self._refined, found.exchanged, found.exhaustive,
+            progress.objective, progress.nodes, self._counts[0], self._made, self._refined, progress.exchanged,
+            progress.exhaustive,
         )  # fmt: skip
         return {
             "open_bound": np.array([node.bound for node in nodes], dtype=np.float64),
@@ -431,8 +433,8 @@ class SizeSearch:
             "open_low": np.array([node.low for node in nodes], dtype=np.int64).reshape(len(nodes), k),
             "open_high": np.array([node.high for node in nodes], dtype=np.int64).reshape(len(nodes), k),
             "open_x": np.array([node.x for node in nodes], dtype=np.float64).reshape(len(nodes), n),
-            "choice": np.full(k, -1, dtype=np.int64) if found.choice is None else found.choice,
-            "x": np.full(n, np.nan) if found.x is None else found.x,
+            "choice": np.full(k, -1, dtype=np.int64) if progress.choice is None else progress.choice,
+            "x": np.full(n, np.nan) if progress.x is None else progress.x,
             "tried": np.array(list(self._known), dtype=np.int64).reshape(len(self._known), k),
             "values": np.array(list(self._known.values()), dtype=np.float64),
             "numbers": np.array(numbers, dtype=np.float64),
@@ -451,16 +453,16 @@ class SizeSearch:
         self._made, self._refined = int(made), bool(refined)
         tried = map(tuple, np.asarray(arrays["tried"]).tolist())
         self._known = dict(zip(tried, np.asarray(arrays["values"]).tolist(), strict=True))
-        self.found = found_in(arrays)
-        self._counts[0] = self.found.evaluations
+        self.progress = progress_in(arrays)
+        self._counts[0] = self.progress.evaluations
 
 
-def found_in(arrays: Mapping[str, NDArray[Any]]) -> Found:
-    """What a search had found that `to_arrays` has kept. Raises KeyError or ValueError where something is missing."""
+def progress_in(arrays: Mapping[str, NDArray[Any]]) -> SearchProgress:
+    """The progress of a search that `to_arrays` has kept. Raises KeyError or ValueError where something is missing."""
     objective, nodes, evaluations, _, refined, exchanged, exhaustive = arrays["numbers"].tolist()
     known = bool(np.isfinite(arrays["x"]).all())
     bounds = arrays["open_bound"]
-    return Found(
+    return SearchProgress(
         choice=np.array(arrays["choice"]) if known else None,
         x=np.array(arrays["x"]) if known else None,
         objective=float(objective),

@@ -17,7 +17,7 @@ from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.state import State
 from mdstopo.scene.moving_volumes import moves, moving_volumes, spent
 from mdstopo.session.outcome import ChosenSizes
-from mdstopo.session.size_search import MOST_EVALUATIONS, Catalogued, Found, SizeSearch, Within, found_in
+from mdstopo.session.size_search import MOST_EVALUATIONS, Catalogued, SearchProgress, SizeSearch, Within, progress_in
 from mdstopo.session.start_in_stages import STAGE, Marked, continued, has_sizes
 from mdstopo.starts.single_start import make_optimizer
 from mdstopo.status import RunStatus
@@ -72,10 +72,10 @@ class Sizes:
             return
         with _whole(view):
             arrays = view.under(SEARCH)
-            found, catalogued = found_in(arrays), self._catalogued(arrays["place"].tolist())
+            progress, catalogued = progress_in(arrays), self._catalogued(arrays["place"].tolist())
             self._continuous = self._sign * float(view.array(f"{CATALOGUE}/continuous"))
         self._kept = len(catalogued.place)
-        self.outcome = self._outcome(found, catalogued)
+        self.outcome = self._outcome(progress, catalogued)
 
     def is_chosen(self, state: State) -> bool:
         """Whether a state belongs to the sizes that were chosen in the end."""
@@ -107,17 +107,17 @@ class Sizes:
         of = count_text(sum(len(group) for group in self.case.design_groups if group.sizes))
         notify(f"choosing sizes of {self._kept} members of {of}, {count_text(catalogued.choices)} choices")
 
-        def save(found: Found) -> None:
-            self.outcome = self._outcome(found, catalogued)
+        def save(progress: SearchProgress) -> None:
+            self.outcome = self._outcome(progress, catalogued)
             keep()
 
-        found = search.run(stop, save)
-        self.outcome = self._outcome(found, catalogued)
-        if (not found.finished and stop()) or found.x is None:
+        progress = search.run(stop, save)
+        self.outcome = self._outcome(progress, catalogued)
+        if (not progress.finished and stop()) or progress.x is None:
             return state
-        return self._end(problem, state, found.x, found)
+        return self._end(problem, state, progress.x, progress)
 
-    def _end(self, problem: Problem, state: State, x: Floats, found: Found) -> State:
+    def _end(self, problem: Problem, state: State, x: Floats, progress: SearchProgress) -> State:
         """The last state of a run: of the choice x (n,), behind that of the continuous optimum."""
         # its sizes have been checked at their prices, and it does not move: rows that are free of bounds hold it
         rows = problem.linear
@@ -131,12 +131,12 @@ class Sizes:
         last.history.constraints[-1] = rows.excess(space.reduce(at_prices(self.case, design)))
         for row in last.history.info.get("constraints", [])[-1:]:
             row[:] = excess_at_prices(self.case, design, row)
-        last.evaluations += found.evaluations
-        last.history.evaluations[-1] += found.evaluations
+        last.evaluations += progress.evaluations
+        last.history.evaluations[-1] += progress.evaluations
         # a choice is no optimum of numbers: no residual tells how far it is from one
         last.kkt = last.history.kkt[-1] = float("nan")
-        last.status = RunStatus.CONVERGED if found.finished else RunStatus.MAX_ITERATIONS
-        last.reason = self._reason(found)
+        last.status = RunStatus.CONVERGED if progress.finished else RunStatus.MAX_ITERATIONS
+        last.reason = self._reason(progress)
         return last
 
     def conclude(self, state: State) -> tuple[RunStatus, str] | None:
@@ -153,18 +153,18 @@ class Sizes:
         """The datasets that a file keeps of the search, and before its end the best choice as the design."""
         if self._search is None:  # of a run that is opened again: as it was
             return {} if self._before is None else _kept(self._before)
-        found = self._search.found
+        progress = self._search.progress
         part: Datasets = {f"{SEARCH}/{name}": array for name, array in self._search.to_arrays().items()}
         part[f"{CATALOGUE}/continuous"] = np.array(self._sign * self._continuous)
-        part[f"{CATALOGUE}/bound"] = np.array(self._sign * found.bound)
-        if found.x is not None:
-            part |= design_part(self.case, self.case.space.expand(found.x))
+        part[f"{CATALOGUE}/bound"] = np.array(self._sign * progress.bound)
+        if progress.x is not None:
+            part |= design_part(self.case, self.case.space.expand(progress.x))
         return part
 
     @property
     def best(self) -> Floats | None:
         """The best choice so far as x (n,), None before there is one."""
-        return None if self._search is None else self._search.found.x
+        return None if self._search is None else self._search.progress.x
 
     # -- how
 
@@ -212,10 +212,10 @@ class Sizes:
         optimizer = make_optimizer(self.case, problem)
         return run_optimizer(optimizer, optimizer.start(x))
 
-    def _outcome(self, found: Found, catalogued: Catalogued) -> ChosenSizes:
+    def _outcome(self, progress: SearchProgress, catalogued: Catalogued) -> ChosenSizes:
         sign, chosen = self._sign, {}
-        if found.x is not None:
-            design = self.case.space.expand(found.x)
+        if progress.x is not None:
+            design = self.case.space.expand(progress.x)
             for group in self.case.design_groups:
                 own = design[self.case.group_slices[group.name]]
                 if group.sizes:
@@ -223,23 +223,23 @@ class Sizes:
                         size: int(np.count_nonzero(np.abs(own - size) <= 1e-12)) for size in group.sizes
                     }
         return ChosenSizes(
-            members=self._kept, choices=catalogued.choices, objective=sign * found.objective,
-            continuous=sign * self._continuous, bound=sign * found.bound, nodes=found.nodes,
-            evaluations=found.evaluations, exhaustive=found.exhaustive, exchanged=found.exchanged,
-            finished=found.finished, sizes=chosen,
+            members=self._kept, choices=catalogued.choices, objective=sign * progress.objective,
+            continuous=sign * self._continuous, bound=sign * progress.bound, nodes=progress.nodes,
+            evaluations=progress.evaluations, exhaustive=progress.exhaustive, exchanged=progress.exchanged,
+            finished=progress.finished, sizes=chosen,
         )  # fmt: skip
 
-    def _reason(self, found: Found) -> str:
-        if found.exhaustive:
+    def _reason(self, progress: SearchProgress) -> str:
+        if progress.exhaustive:
             how = "the best of all choices"
-        elif found.finished:
-            how = f"no one of {found.nodes} nodes has a better relaxation"
+        elif progress.finished:
+            how = f"no one of {progress.nodes} nodes has a better relaxation"
         else:
-            how = f"the best of {found.nodes} nodes, after which the search ends"
+            how = f"the best of {progress.nodes} nodes, after which the search ends"
         size = abs(self._continuous) or 1.0
-        worse = (found.objective - self._continuous) / size
+        worse = (progress.objective - self._continuous) / size
         return (
-            f"sizes of {self._kept} members chosen: {how}, {found.evaluations} evaluations; "
+            f"sizes of {self._kept} members chosen: {how}, {progress.evaluations} evaluations; "
             f"{worse:.3%} worse than the continuous optimum"
         )
 

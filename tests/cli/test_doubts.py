@@ -142,7 +142,7 @@ def test_small_swings_and_steps_of_the_solver_are_not_told() -> None:
 
 
 def evaluated(value: float) -> Any:
-    return SimpleNamespace(found=SimpleNamespace(status=Status.OK, objectives={"G": value}))
+    return SimpleNamespace(evaluation=SimpleNamespace(status=Status.OK, objectives={"G": value}))
 
 
 @pytest.mark.parametrize(("sense", "now", "told"), [("minimize", 1.04, 0), ("minimize", 1.2, 1), ("maximize", 0.8, 1)])

@@ -165,9 +165,9 @@ def test_starts_spread_over_the_bounds_and_the_best_is_kept(drop: FitProblem) ->
     run = run_fit(problem)
     assert run.status == "converged"
     assert run.starts[run.best].level == min(each.level for each in run.starts)
-    assert run.found is not None
-    np.testing.assert_allclose(run.found.x, run.starts[run.best].x)
-    np.testing.assert_allclose(run.found.x, TRUTH, rtol=0.1)
+    assert run.minimum is not None
+    np.testing.assert_allclose(run.minimum.x, run.starts[run.best].x)
+    np.testing.assert_allclose(run.minimum.x, TRUTH, rtol=0.1)
 
 
 def stop_after(count: int) -> Callable[[], bool]:
@@ -190,7 +190,7 @@ def test_a_fit_that_is_stopped_goes_on_where_it_was(drop: FitProblem) -> None:
     stopped = run_fit(problem, points=1, stop=stop_after(first + 2))
     assert stopped.status == "interrupted"
     assert len(stopped.starts) == 1
-    assert stopped.found is not None  # of the start that is done
+    assert stopped.minimum is not None  # of the start that is done
     again = run_fit(problem, points=1, before=stopped)
     assert again.status == "converged"
     assert [each.x.tolist() for each in again.starts] == [each.x.tolist() for each in whole.starts]

@@ -93,7 +93,7 @@ def test_a_response_that_is_no_number_is_told(evaluator, monkeypatch):
     driver = evaluator.driver(next(iter(evaluator.scenes)))
 
     def lost(*_):
-        driver.found[0] = 1
+        driver.row_counts[0] = 1
         driver.rows[0, 0, [TIME, VALUE]] = 0.25, np.nan
 
     monkeypatch.setattr(driver, "_reduce_response", lost)

@@ -162,7 +162,7 @@ class Bench:
         self.alpha = np.asarray(alpha, dtype=float)
         self.strength = np.zeros((3, padded))
         self.rows = np.zeros((count, ROWS, 4))
-        self.found = np.zeros(count, dtype=np.int64)
+        self.row_counts = np.zeros(count, dtype=np.int64)
         self.gradients = np.zeros((count, ROWS, self.scene.n_design))
         while True:
             self.limits = np.array([200_000, self.size, 20 * self.size])
@@ -181,7 +181,8 @@ class Bench:
             evaluate_responses(
                 self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, settings, self.limits,
                 self.count, self.reductions, gradient, self.room, self.room_ints, self.strength,
-                np.zeros((ROWS, padded)), self.rows, self.found, self.gradients, np.zeros(2, dtype=np.int64), self.work,
+                np.zeros((ROWS, padded)), self.rows, self.row_counts, self.gradients, np.zeros(2, dtype=np.int64),
+                self.work,
             )  # fmt: skip
         arrays = carve.py_func(
             self.room, self.room_ints, n, pairs, self.size, 20 * self.size, self.scene.damped, turning

@@ -26,29 +26,29 @@ class Brought(Generic[T]):
     def __init__(self, group: str, enter: Callable[[Any], T]) -> None:
         self.group = group
         self._enter = enter
-        #: those found so far
-        self.found: dict[str, T] = {}
+        #: those known so far, by word
+        self.records: dict[str, T] = {}
 
     def find(self, word: str) -> T | None:
         """The record that is registered under a word; None where there is none. BroughtError where it cannot be
         used."""
         self._look(word)
-        return self.found.get(word)
+        return self.records.get(word)
 
     def find_all(self) -> dict[str, T]:
         """All records that are registered. BroughtError where one cannot be used; the others are found then."""
         self._look()
-        return self.found
+        return self.records
 
     def _look(self, word: str | None = None) -> None:
         from importlib.metadata import entry_points
 
         wrong = None
         for point in sorted(entry_points(group=self.group), key=lambda each: each.name):
-            if point.name in self.found or (word is not None and point.name != word):
+            if point.name in self.records or (word is not None and point.name != word):
                 continue
             try:
-                self.found[point.name] = self._enter(point.load())
+                self.records[point.name] = self._enter(point.load())
             except Exception as error:
                 what = f"{type(error).__name__}: {error}"
                 wrong = wrong or BroughtError(f"{point.name!r} of {self.group} ({point.value}) cannot be used: {what}")

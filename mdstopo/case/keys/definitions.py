@@ -152,7 +152,7 @@ class _Names:
         if entry is not None and entry[1].kind == MAPPING:
             self.nodes = {word: value for word, (_, value) in entry[1].entries.items()}
         self.reading = reading
-        self.found: dict[str, float] = {}
+        self.numbers: dict[str, float] = {}
         #: names without a number; their mistake is noted already, or will be where the section is read
         self.failed: set[str] = set()
         self.formulas: dict[str, Formula] = {}
@@ -170,22 +170,22 @@ class _Names:
             elif isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(to_float(value)):
                 self.failed.add(word)
             else:
-                self.found[word] = to_float(value)
+                self.numbers[word] = to_float(value)
         for word in self.formulas:
             self._evaluate(word)
-        return self.found
+        return self.numbers
 
     def _evaluate(self, first: str) -> None:
         """A name after those that it uses; `open_names` is the way to it, so that a cycle is told with its path."""
         open_names = [first]
         while open_names:
             word = open_names[-1]
-            if word in self.found or word in self.failed:
+            if word in self.numbers or word in self.failed:
                 open_names.pop()
                 continue
             formula = self.formulas[word]
             used = names_in(formula.root)
-            missing = next((each for each in used if each not in self.found), None)
+            missing = next((each for each in used if each not in self.numbers), None)
             if missing is None:
                 self._set(word, formula)
             elif missing in self.failed:
@@ -198,7 +198,7 @@ class _Names:
 
     def _set(self, word: str, formula: Formula) -> None:
         try:
-            self.found[word] = finite_value(formula, self.found)
+            self.numbers[word] = finite_value(formula, self.numbers)
         except FormulaError as error:
             self.reading.mistake(inside(SECTION, word), str(error), self.nodes[word])
             self.reading.ignore(self.nodes[word])
@@ -216,7 +216,7 @@ class _Numbers:
     """The tree on its way to numbers; parts that aliases share stay shared."""
 
     def __init__(self, values: Mapping[str, float], failed: set[str], reading: Reading, kept: Container[str]) -> None:
-        self.values = values
+        self.numbers = values
         self.kept = kept
         self.names = [*values, *failed]
         self.failed = failed
@@ -259,7 +259,7 @@ class _Numbers:
         """The number that an expression comes to; the node itself where it comes to none, which is noted."""
         word = path.removeprefix(f"{SECTION}.")
         if word != path:
-            return _with_number(node, self.values[word]) if word in self.values else node
+            return _with_number(node, self.numbers[word]) if word in self.numbers else node
         formula = formula_in(node, path, self.names, self.reading)
         if formula is None:
             return node
@@ -267,7 +267,7 @@ class _Numbers:
             self.reading.ignore(node)
             return node
         try:
-            return _with_number(node, finite_value(formula, self.values))
+            return _with_number(node, finite_value(formula, self.numbers))
         except FormulaError as error:
             self.reading.mistake(path, str(error), node)
             self.reading.ignore(node)

@@ -213,7 +213,7 @@ class Tagged(Value):
     @property
     def known(self) -> dict[str, Record]:
         """The variants by their tags, with those of other distributions that have been asked for."""
-        return {**self.variants, **(self.more.found if self.more is not None else {})}
+        return {**self.variants, **(self.more.records if self.more is not None else {})}
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """The values at a node by the keys that its tag allows, BAD in the place of what cannot be read."""
@@ -332,14 +332,14 @@ class Record(Value):
     @property
     def all_keys(self) -> tuple[Key, ...]:
         """The keys, with those of other distributions that have been asked for."""
-        return (*self.keys, *(self.more.found.values() if self.more is not None else ()))
+        return (*self.keys, *(self.more.records.values() if self.more is not None else ()))
 
     @property
     def sets(self) -> tuple[tuple[str, ...], ...]:
         """Which keys exclude each other (`one_of`), with those that other distributions have brought."""
-        if self.more is None or not self.more.found:
+        if self.more is None or not self.more.records:
             return self.one_of
-        return ((*self.one_of[0], *self.more.found), *self.one_of[1:])
+        return ((*self.one_of[0], *self.more.records), *self.one_of[1:])
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """The values at a node by their keys, BAD in the place of what cannot be read; BAD where it is no mapping."""

@@ -127,7 +127,7 @@ class GeneralDriver:
         self._expressions = [j for j, response in enumerate(scene.responses) if response.of]
         self.padded = np.zeros(padded + varied)
         self._padded_row = self.padded.reshape(1, -1)
-        self.found = np.zeros(count, dtype=np.int64)
+        self.row_counts = np.zeros(count, dtype=np.int64)
         #: how the value of every response is formed: plain, absolute, a norm (`evaluation.Peak.shape`)
         self.shapes: tuple[Shape, ...] = tuple(
             shape_of(model, j, reduction) for j, reduction in enumerate(scene.reductions)
@@ -295,7 +295,7 @@ class GeneralDriver:
             status, message = self._without_value(gradient)
         grazing, meeting = self._grazing(), self.where.item(1)
         return ResponseResult(
-            status, time, self.rows, self.found, self.gradients, meeting, grazing, across, message=message
+            status, time, self.rows, self.row_counts, self.gradients, meeting, grazing, across, message=message
         )
 
     def _find_rows(self, count: int, gradient: bool, window: float, across: FloatArray | None) -> None:
@@ -317,16 +317,16 @@ class GeneralDriver:
         when."""
         for j, response in enumerate(self.scene.responses):
             # what is no number is the limit that other rows are compared with, so it stands first; not in expressions
-            if not response.of and (not self.found[j] or math.isfinite(self.rows.item(j, 0, VALUE))):
+            if not response.of and (not self.row_counts[j] or math.isfinite(self.rows.item(j, 0, VALUE))):
                 continue
-            found = self.rows[j, : self.found[j]]
-            none = found[~np.isfinite(found[:, VALUE])]
+            rows = self.rows[j, : self.row_counts[j]]
+            none = rows[~np.isfinite(rows[:, VALUE])]
             if len(none):
                 what = f"expression {response.formula}" if response.of else f"response {response.kind}"
                 when = f" at t = {none[0, TIME]:.6g} s" if np.isfinite(none[0, TIME]) else ""
                 return Status.NON_FINITE, f"the {what} has no value{when}"
         for j in self._expressions if gradient else ():
-            if not np.all(np.isfinite(self.gradients[j, : self.found[j]])):
+            if not np.all(np.isfinite(self.gradients[j, : self.row_counts[j]])):
                 return Status.NO_GRADIENT, f"the expression {self.scene.responses[j].formula} has an infinite slope"
         return Status.OK, ""
 
@@ -374,8 +374,8 @@ class GeneralDriver:
         steps, events = int(self.limits[1]), int(self.limits[3])
         event = self.room_ints[4 * (steps + 1) :].reshape(events, 6)[: self.events]
         for state, member, *_ in event[event[:, GRAZES] != 0].tolist():
-            for rows, found in zip(self.rows, self.found, strict=True):
-                if np.any(rows[:found, STEP] + rows[:found, FRACTION] == state):
+            for rows, n_rows in zip(self.rows, self.row_counts, strict=True):
+                if np.any(rows[:n_rows, STEP] + rows[:n_rows, FRACTION] == state):
                     return int(member)
         return -1
 
@@ -389,7 +389,7 @@ class GeneralDriver:
             rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
             if gradient:
                 self.gradients[j, 0] *= slope
-            self.found[j] = 1
+            self.row_counts[j] = 1
             if switches_of(self.scene.model, j):
                 pieces = Pieces(self, j, t[: count + 1].copy())
                 self.jumps[j] = switched_integral(self, j, pieces, reduction.is_squared, slope)
@@ -398,11 +398,11 @@ class GeneralDriver:
         competing = compete(self.scene.model.response[j, 0], reduction)
         switched = switches_of(self.scene.model, j) > 0 and not reduction.at_end
         if not competing and not switched and reduction.is_largest:
-            found = self._peaks_of_steps(j, reduction.is_magnitude, count, window)
+            n_rows = self._peaks_of_steps(j, reduction.is_magnitude, count, window)
         elif not competing and reduction.at_end:
             value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
             rows[0] = row_of(self.states()[0].item(count), value, count - 1, 1.0, rate, 1.0, who)
-            found = 1
+            n_rows = 1
         else:
             t = self.states()[0][: count + 1].copy()
             if switched:
@@ -411,10 +411,10 @@ class GeneralDriver:
                 candidates = members_peaks(self, j, t, reduction.at_end, window, len(rows))
             else:
                 candidates = list(minima(self, j, t))
-            found = self.entry.rank_rows(np.array(candidates), window, float(t[-1] - t[0]), rows)
-        self.found[j] = found
+            n_rows = self.entry.rank_rows(np.array(candidates), window, float(t[-1] - t[0]), rows)
+        self.row_counts[j] = n_rows
         if reduction.is_magnitude:
-            rows[:found, VALUE] *= rows[:found, SIGN]
+            rows[:n_rows, VALUE] *= rows[:n_rows, SIGN]
 
     @cached_property
     def _plain_rows(self) -> bool:
@@ -433,14 +433,14 @@ class GeneralDriver:
     def _find_rows_with_gradients(self, count: int, window: float) -> bool:
         """Rows of the only response, with their gradients; False where these are still to be found."""
         (reduction,) = self.scene.reductions
-        found, differentiated = self.ready.often(
+        n_rows, differentiated = self.ready.often(
             "rows_with_gradients", self.entry.rows_with_gradients, (self.floats, self.rows),
             ((COUNT_AT, count), (WINDOW_AT, window)),
             lambda: self._plain_arguments(count, window),
         )  # fmt: skip
-        self.found[0] = found
+        self.row_counts[0] = n_rows
         if reduction.is_magnitude:
-            self.rows[0, :found, VALUE] *= self.rows[0, :found, SIGN]
+            self.rows[0, :n_rows, VALUE] *= self.rows[0, :n_rows, SIGN]
         return bool(differentiated)
 
     def _plain_arguments(self, count: int, window: float) -> tuple[Any, ...]:

@@ -64,7 +64,7 @@ def by_constant_load(
     """Gradients with inertia and loads frozen; `across` is left as it is."""
     gradients, rows = np.zeros_like(result.gradients), result.rows.copy()
     for j, reduction in enumerate(driver.scene.reductions):
-        for r in range(int(result.found[j])):
+        for r in range(int(result.row_counts[j])):
             gradients[j, r] = _held(driver, j, rows[j, r], reduction, driver.count)
     return gradients, ""
 
@@ -106,7 +106,7 @@ def _carried(
             else:
                 gradients[j, r] += sign_of(driver, j, r) * share * own
     for j, reduction in enumerate(driver.scene.reductions):
-        if reduction.is_integral and result.found[j]:
+        if reduction.is_integral and result.row_counts[j]:
             integral, row, block = reduction.power, result.rows[j, 0], driver.row_gradients.block(1)
             block.which[0] = j, 0
             stopped = _push(driver, count, block, integral, iterations)

@@ -47,7 +47,7 @@ def wanted_rows(driver: "GeneralDriver", across: bool) -> list[WantedRow]:
         WantedRow(j, r, is_across, share, part)
         for j, reduction in enumerate(driver.scene.reductions)
         if not reduction.is_integral
-        for r in range(driver.found.item(j))
+        for r in range(driver.row_counts.item(j))
         for share, part in parts(driver.rows[j, r])
         for is_across in range(2 if across and driver.shapes[j] == "norm" else 1)
     ]
@@ -97,7 +97,7 @@ class RowGradients:
                     begun.add((j, r))
         for j, reduction in enumerate(driver.scene.reductions):
             if not reduction.is_integral:
-                for r in range(driver.found.item(j)):
+                for r in range(driver.row_counts.item(j)):
                     if (j, r) not in begun:  # it has no parts
                         driver.gradients[j, r] = 0.0
 

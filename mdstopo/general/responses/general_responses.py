@@ -556,7 +556,7 @@ def chosen_part(model, member_state, segment, j, who, t, q, v, a, lam, workspace
         return who
     if model.response[j, KIND] == MEMBER_FORCE:
         return np.int64(largest_force(model, member_state, segment, t, model.response[j, SUBJECT], q, v, a))
-    if has_switches(model, j):
+    if response_switches(model, j):
         p = _expression_numbers(model, member_state, segment, j, t, q, v, a, lam, workspace)
         return formula_mode(model, j, p, t) + (-1 - who) * MARGINS
     return np.int64(who)
@@ -565,11 +565,11 @@ def chosen_part(model, member_state, segment, j, who, t, q, v, a, lam, workspace
 @kernel
 def is_chosen(model, j):
     """Whether response j is one of several, by `chosen_part`."""
-    return model.response[j, KIND] == MEMBER_FORCE or has_switches(model, j)
+    return model.response[j, KIND] == MEMBER_FORCE or response_switches(model, j)
 
 
 @kernel
-def has_switches(model, j):
+def response_switches(model, j):
     """Whether response j is an expression with kinks or jumps."""
     return model.response[j, KIND] == EXPRESSION and model.response[j, SWITCHES] > 0
 

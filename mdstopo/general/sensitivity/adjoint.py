@@ -39,10 +39,10 @@ from mdstopo.general.responses.general_responses import (
     equal_forces,
     has_energy,
     has_forces,
-    has_switches,
     kinked,
     members_of,
     response,
+    response_switches,
     value_at,
 )
 from mdstopo.general.steps.method_interface import point_of, step_back, weights_of
@@ -623,7 +623,7 @@ def integral_cotangents(
     kind = model.response[j, KIND]
     designed = has_energy(model, j) or has_forces(model, j)
     bends = kinked(model, j)
-    switches = has_switches(model, j)
+    switches = response_switches(model, j)
     slopes = np.zeros((3, n))
     rows = np.zeros(n_row)
     mine = np.int64(-1)
