@@ -53,6 +53,9 @@ class DriverWithRun(Protocol):
     def states(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Times, coordinates and velocities of all steps, with unused entries behind them."""
 
+    def index_of_steps(self) -> IndexArray:
+        """(room for steps + 1, 4): what `StepHistory.index` has of every step, with unused entries behind them."""
+
     def evaluate_one(self, j: int, count: int, place: FloatArray, who: int = -1) -> FloatArray:
         """(3,) value, rate, member of response j at one place (2,), exactly, of a run of so many steps; overwritten by
         the next call. who: the member whose force is meant."""

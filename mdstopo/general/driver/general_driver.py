@@ -789,6 +789,12 @@ class GeneralDriver:
         end = at_v + steps * len(model.v0)
         return room[:steps], room[steps:at_v].reshape(steps, -1), room[at_v:end].reshape(steps, -1)
 
+    def index_of_steps(self) -> IndexArray:
+        """(room for steps + 1, 4): what `StepHistory.index` has of every step, as a view of the driver's array, with
+        unused entries behind them."""
+        steps = int(self.limits[1]) + 1
+        return self.room_ints[: 4 * steps].reshape(steps, 4)
+
     def member(self, padded: int) -> str:
         """A member (or contact) in words, from its place in the padded arrays."""
         return named_member(self, padded)

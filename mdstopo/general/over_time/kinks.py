@@ -14,10 +14,12 @@ from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import GeneralModel
 from mdstopo.general.over_time.minima import LOW
 from mdstopo.general.over_time.pieces import Pieces
-from mdstopo.general.responses.extremes import FRACTION, STEP, VALUE, EvaluateAt
+from mdstopo.general.responses.extremes import FRACTION, STEP, TIME, VALUE, EvaluateAt
 from mdstopo.general.responses.general_responses import has_kinks, has_norm, is_expression
 from mdstopo.scene.springs_model import FloatArray
 
+#: a window, relative to the lowest minimum, within which every minimum is: the lowest may be next to zero
+ALL = 1e9
 #: how long the steps beside a norm's zero are, relative to the step that it was found in: the last stage of a step is
 #: off by its length to the sixth power or so
 BESIDE = 0.1
@@ -37,9 +39,9 @@ def kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
     if not has_kinks(driver.scene.model, j):
         return found
     rate = float(np.abs(rates).max())
-    for row in pieces.minima(1e9):
+    for row in pieces.minima(ALL):
         low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
-        if low > LOW * highest or not t[0] < row[0] < t[-1]:
+        if low > LOW * highest or not t[0] < row[TIME] < t[-1]:
             continue
         w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.evaluate_at)
         if min(w + c, len(pieces.t) - 1 - w - c) <= DISTANCES[-1]:  # zero from the start, or to the end: no kink

@@ -9,13 +9,13 @@ alone, actuators at their limit, symmetry) do not cross between them.
 
 from collections.abc import Callable, Iterator
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import KIND, MEMBER_FORCE
 from mdstopo.general.over_time.competing_members import compare, members_behind
+from mdstopo.general.over_time.piece import Piece, add_piece, apart
 from mdstopo.general.responses.extremes import FRACTIONS
 from mdstopo.general.responses.general_responses import TIE
 from mdstopo.general.responses.sampled_roots import roots_between
@@ -31,27 +31,15 @@ CLOSE = 1e-3
 MOST = 12
 #: the largest value of the cubics h10 and h11 of Hermite, which go with the rates
 BEND = 4.0 / 27.0
-#: the smallest part of a step that a member may lead for
-EDGE = 1e-9
 
 
-class Lead(NamedTuple):
-    """A part of a step, from fraction `low` to `high`, in which one member carries the largest force, or switches keep
-    their sides."""
-
-    step: int
-    low: float
-    high: float
-    member: int
-
-
-def leads(driver: DriverWithRun, j: int, t: FloatArray) -> list[Lead]:
-    """The members that carry the largest force of response j one after the other, in order of time; t (m + 1,): the
-    steps' times."""
+def pieces_by_member(driver: DriverWithRun, j: int, t: FloatArray) -> list[Piece]:
+    """The pieces in which one member carries the largest force of response j, in order of time; t (m + 1,): the steps'
+    times."""
     count, members = len(t) - 1, members_behind(driver, j)
-    found: list[Lead] = []
+    pieces: list[Piece] = []
     if members == 1:
-        return [Lead(w, 0.0, 1.0, 0) for w in range(count)]
+        return [Piece(w, 0.0, 1.0, 0) for w in range(count)]
     everyone = np.arange(members)
     batch = max(1, BATCH // (members * len(FRACTIONS)))
     for first in range(0, count, batch):
@@ -64,15 +52,10 @@ def leads(driver: DriverWithRun, j: int, t: FloatArray) -> list[Lead]:
             who = np.flatnonzero(may[:, i])
             who = who[_different(force[who, i])] if len(who) > 1 else who
             if len(who) < 2:
-                found.append(Lead(w, 0.0, 1.0, int(leader[i])))
+                pieces.append(Piece(w, 0.0, 1.0, int(leader[i])))
             else:
-                found += _in_step(driver, j, count, w, float(t[w + 1] - t[w]), who)
-    return found
-
-
-def changes(leads_of: list[Lead], t: FloatArray) -> list[float]:
-    """The times within steps at which the lead changes."""
-    return [float(t[lead.step] + lead.low * (t[lead.step + 1] - t[lead.step])) for lead in leads_of if lead.low > 0.0]
+                pieces += _in_step(driver, j, count, w, float(t[w + 1] - t[w]), who)
+    return pieces
 
 
 def is_led(driver: DriverWithRun, j: int) -> bool:
@@ -122,8 +105,8 @@ def _different(force: FloatArray) -> IndexArray:
     return np.array(kept, dtype=np.int64)
 
 
-def _in_step(driver: DriverWithRun, j: int, count: int, w: int, h: float, who: IndexArray) -> list[Lead]:
-    """Who leads when within one step, in order of time.
+def _in_step(driver: DriverWithRun, j: int, count: int, w: int, h: float, who: IndexArray) -> list[Piece]:
+    """The pieces of one step, each with the member that leads in it, in order of time.
 
     driver: of the load case, with its last motion.
     j: the response, whose group the members belong to.
@@ -153,22 +136,10 @@ def _in_step(driver: DriverWithRun, j: int, count: int, w: int, h: float, who: I
     # the exact forces in the middle of each piece say who leads there; mostly the whole step is one piece
     size = np.abs(exact(middles, np.arange(len(who))))
     first = (size >= (1.0 - TIE) * size.max(axis=0)).argmax(axis=0)
-    found: list[Lead] = []
+    pieces: list[Piece] = []
     for low, high, member in zip(ends[:-1].tolist(), ends[1:].tolist(), who[first].tolist(), strict=True):
-        if found and found[-1].member == member:
-            found[-1] = found[-1]._replace(high=high)
-        else:
-            found.append(Lead(w, low, high, member))
-    return found
-
-
-def apart(cuts: list[float]) -> list[float]:
-    """Cuts, rising from 0, without those next to each other or to the end of the step."""
-    kept = cuts[:1]
-    for cut in cuts[1:]:
-        if cut - kept[-1] > EDGE and cut < 1.0 - EDGE:
-            kept.append(cut)
-    return kept
+        add_piece(pieces, Piece(w, low, high, member))
+    return pieces
 
 
 def _roots(

@@ -40,7 +40,7 @@ def minima(driver: DriverWithRun, j: int, t: FloatArray) -> FloatArray:
         between = k if c <= 0.0 else k + 1  # the number of the boundary, if the place is one
         pieces.settle(row, k, float(pieces.fraction(np.array([k]), np.array([c]))[0]))
         if c <= 0.0 or c >= 1.0:
-            if 0 < between < len(pieces.leads):
+            if 0 < between < len(pieces):
                 _at_boundary(row, pieces, between, highest, pieces.is_stated(between))
         elif bent and row[VALUE] <= LOW * highest:
             _turned_round(row, pieces, k)
@@ -53,7 +53,7 @@ def _at_boundary(row: FloatArray, pieces: Pieces, b: int, highest: float, stated
     stated: whether the time is given, or an event's: then it varies as that does.
     """
     before, behind = pieces.one_sided_limits(b)
-    row[VALUE] = (before if row[FRACTION] == pieces.leads[b - 1].high else behind)[0]
+    row[VALUE] = (before if row[FRACTION] == pieces[b - 1].high else behind)[0]
     (falls, first), (rises, second) = before[1:].tolist(), behind[1:].tolist()
     if not falls <= 0.0 <= rises or falls == rises:
         return

@@ -109,8 +109,7 @@ def _rule(driver: DriverWithRun, count: int) -> FloatArray:
     """Nodes and weights (2, s) on (0, 1) by which stages integrate; where steps differ in that, the least of them."""
     tables, model = driver.method.tables, driver.scene.model
     if driver.method.collocates:
-        steps = int(driver.limits[1]) + 1
-        first = driver.room_ints[: 4 * steps].reshape(steps, 4)[: count + 1, FIRST]
+        first = driver.index_of_steps()[: count + 1, FIRST]
         least = int(np.diff(first).min())
         rule: FloatArray = tables[LEVELS.index(least), 0, :2, :least]
         return rule

@@ -3,22 +3,23 @@
 import numpy as np
 
 from mdstopo.general.driver_interface import DriverWithRun
-from mdstopo.general.over_time.leading_members import Lead, apart
+from mdstopo.general.over_time.piece import Piece, add_piece, apart
 from mdstopo.general.responses.extremes import FRACTIONS
 from mdstopo.general.responses.general_responses import switches_of
 from mdstopo.general.responses.sampled_roots import may_vanish, roots_between
 from mdstopo.scene.springs_model import FloatArray
 
 
-def switch_leads(driver: DriverWithRun, j: int, t: FloatArray) -> list[Lead]:
-    """The times between which the switches of expression j keep their sides, in order; t (m + 1,): the steps' times."""
+def pieces_by_sides(driver: DriverWithRun, j: int, t: FloatArray) -> list[Piece]:
+    """The pieces in which the switches of expression j keep their sides, in order of time; t (m + 1,): the steps'
+    times."""
     count = len(t) - 1
     fractions = np.array(FRACTIONS)
     places = np.column_stack([np.repeat(np.arange(count), len(fractions)), np.tile(fractions, count)]).astype(float)
     cuts = _cuts(driver, j, t, places)
     middle = np.column_stack([np.arange(count), np.full(count, 0.5)])
     sides = driver.sample_response(j, middle, False, count, rates=False)[2][:, 2]
-    found: list[Lead] = []
+    pieces: list[Piece] = []
     for w in range(count):
         ends = [*apart([0.0, *sorted(cuts.get(w, []))]), 1.0]
         who = [int(sides[w])]
@@ -27,12 +28,9 @@ def switch_leads(driver: DriverWithRun, j: int, t: FloatArray) -> list[Lead]:
             inside = np.column_stack([np.full(len(middles), float(w)), middles])
             seen = driver.sample_response(j, inside, True, count, rates=False)[2][:, 2]
             who = [int(each) for each in seen]
-        for low, high, mode in zip(ends[:-1], ends[1:], who, strict=True):
-            if found and found[-1].step == w and found[-1].member == mode:
-                found[-1] = found[-1]._replace(high=high)
-            else:
-                found.append(Lead(w, low, high, mode))
-    return found
+        for low, high, its_sides in zip(ends[:-1], ends[1:], who, strict=True):
+            add_piece(pieces, Piece(w, low, high, its_sides))
+    return pieces
 
 
 def _cuts(driver: DriverWithRun, j: int, t: FloatArray, places: FloatArray) -> dict[int, list[float]]:

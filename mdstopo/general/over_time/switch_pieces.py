@@ -36,7 +36,7 @@ def switched_peaks(
             k, c = int(row[STEP]), float(row[FRACTION])
             between = k if c <= 0.0 else k + 1  # the number of the boundary, if the place is one
             pieces.settle(row, k, float(pieces.fraction(np.array([k]), np.array([c]))[0]))
-            if (c <= 0.0 or c >= 1.0) and 0 < between < len(pieces.leads) and not pieces.is_stated(between):
+            if (c <= 0.0 or c >= 1.0) and 0 < between < len(pieces) and not pieces.is_stated(between):
                 row[VALUE], row[RATE], _ = pieces.one_sided_limits(between)[0 if c >= 1.0 else 1]
                 speed, margin = _passed(driver, j, pieces, between)
                 if margin:
@@ -57,8 +57,8 @@ def switched_integral(
     """
     found = []
     largest = float(np.abs(pieces.samples[:, :, 0]).max())
-    for b in range(1, len(pieces.leads)):
-        if pieces.leads[b].member == pieces.leads[b - 1].member or pieces.is_stated(b):
+    for b in range(1, len(pieces)):
+        if pieces[b].who == pieces[b - 1].who or pieces.is_stated(b):
             continue
         before, behind = (float(seen[0]) for seen in pieces.one_sided_limits(b))
         drop = before * before - behind * behind if square else before - behind
@@ -77,7 +77,7 @@ def _passed(driver: DriverWithRun, j: int, pieces: Pieces, b: int) -> tuple[floa
 
     Of several it is the one that is nearest to zero in time.
     """
-    old, new = pieces.leads[b - 1].member, pieces.leads[b].member
+    old, new = pieces[b - 1].who, pieces[b].who
     best = (0.0, 0)
     nearest = np.inf
     for switch in range(switches_of(driver.scene.model, j)):
