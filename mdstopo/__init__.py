@@ -4,6 +4,7 @@ Four calls run the same engine as the command line: `load_case`, `simulate`, `ev
 Names are resolved on first use, so that importing the package costs nothing.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from mdstopo._version import __version__
@@ -35,13 +36,18 @@ __all__ = [
 ]
 
 
+#: names that need no engine, with their modules; the others are those of `api`
+_WITHOUT_ENGINE = {
+    "Case": "mdstopo.case.model",
+    "CaseError": "mdstopo.case.text.errors",
+    "load_case": "mdstopo.case.reader",
+}
+
 if not TYPE_CHECKING:  # for type checkers, names that are not there are mistakes
 
     def __getattr__(name):
         if name in __all__:
-            from mdstopo import api
-
-            value = getattr(api, name)
+            value = getattr(import_module(_WITHOUT_ENGINE.get(name, "mdstopo.api")), name)
             globals()[name] = value
             return value
         raise AttributeError(f"module 'mdstopo' has no attribute {name!r}")

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdstopo.case.geometry.mesh_files import MeshError, surface
-from mdstopo.case.geometry.svg_path import PathError, areas
+from mdstopo.case.geometry.svg_areas import PathError, areas
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.finalize.document import content_of

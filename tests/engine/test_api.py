@@ -20,6 +20,17 @@ def test_dir_shows_every_call_before_any_is_used():
     assert done.stdout.split() == ["True", "False"]
 
 
+def test_reading_a_case_loads_no_engine():
+    program = (
+        f"import sys, mdstopo; mdstopo.load_case({str(CASES / 'fig6.yaml')!r})\n"
+        "heavy = ('mdstopo.api', 'mdstopo.engine', 'mdstopo.optimizer', 'mdstopo.compiler')\n"
+        "print([name for name in sys.modules if name.startswith(heavy)])\n"
+        "import mdstopo.api; print(mdstopo.load_case is mdstopo.api.load_case)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["[]", "True"]
+
+
 def test_load_case_reads_a_file_and_overrides():
     case = load_case(CASES / "fig6.yaml", overrides={"solver.integrator": "runge_kutta", "solver.tolerance": 1e-6})
     assert isinstance(case, Case)
