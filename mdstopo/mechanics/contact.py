@@ -103,8 +103,8 @@ def contact_margins(c, mode):
 def contact_one_margin(c, which, height, rise, room, mode):
     """One margin of a mode and its slopes by height, rise and room.
 
-    c: the numbers of the contact. which, mode: 0 of height, 1 of room, 2 of the normal force before it is cut off,
-    divided by k + c; as many as `contact_margins` of the mode; of those that are not on the edge the height alone.
+    c: the numbers of the contact. which, mode: 0 of height, 1 of room, 2 of the normal force, as many as
+    `contact_margins` of the mode; of those that are not on the edge the height alone.
     height, rise, room: where the point is (m), how fast it rises (m/s), and how far it is from the nearer end (m).
     """
     if mode == ABOVE:
@@ -113,37 +113,40 @@ def contact_one_margin(c, which, height, rise, room, mode):
         return -height, -1.0, 0.0, 0.0
     if which == 1:
         return room, 0.0, 0.0, 1.0
-    sign = -1.0 if mode == CLOSED else 1.0
-    total = c[0] + c[1]
-    return sign * (c[0] * height + c[1] * rise) / total, sign * c[0] / total, sign * c[1] / total, 0.0
-
-
-@inline
-def _least(c, height, rise, room, mode):
-    """The number of the margin that is the least."""
-    if mode in (ABOVE, BESIDE):
-        return 0
-    which = 0 if -height <= room else 1
-    if c[1] > 0.0:
-        force, _, _, _ = contact_one_margin(c, 2, height, rise, room, mode)
-        if force < min(-height, room):
-            which = 2
-    return which
+    sign = (-1.0 if mode == CLOSED else 1.0) / (c[0] + c[1])
+    return sign * (c[0] * height + c[1] * rise), sign * c[0], sign * c[1], 0.0
 
 
 @inline
 def contact_margin(c, height, rise, room, mode):
-    """How far the mode is from its end: the least of its margins."""
-    s, _, _, _ = contact_one_margin(c, _least(c, height, rise, room, mode), height, rise, room, mode)
-    return s
+    """How far the mode is from its end: a distance in m, or the normal force before it is cut off, divided by k + c."""
+    if mode == ABOVE:
+        return height
+    if mode == BESIDE:
+        return -height
+    margin = min(-height, room)
+    if c[1] == 0.0:
+        return margin
+    unclipped = -(c[0] * height + c[1] * rise) / (c[0] + c[1])
+    return min(margin, unclipped) if mode == CLOSED else min(margin, -unclipped)
 
 
 @inline
 def contact_margin_slopes(c, height, rise, room, mode):
     """Slopes of the margin by height, rise and room."""
-    which = _least(c, height, rise, room, mode)
-    _, by_height, by_rise, by_room = contact_one_margin(c, which, height, rise, room, mode)
-    return by_height, by_rise, by_room
+    if mode == ABOVE:
+        return 1.0, 0.0, 0.0
+    if mode == BESIDE:
+        return -1.0, 0.0, 0.0
+    margin = min(-height, room)
+    if c[1] > 0.0:
+        sign = -1.0 if mode == CLOSED else 1.0
+        total = c[0] + c[1]
+        if sign * (c[0] * height + c[1] * rise) / total < margin:
+            return sign * c[0] / total, sign * c[1] / total, 0.0
+    if -height <= room:
+        return -1.0, 0.0, 0.0
+    return 0.0, 0.0, 1.0
 
 
 @inline

@@ -38,6 +38,38 @@ def gap_idle(mode):
 
 
 @inline
+def gap_margin(p, x, xd, mode):
+    """How far a member is from the end of its mode: y in m, or the force before it is cut off, divided by k + c."""
+    y = p[3] * x - p[2]
+    if mode == OPEN:
+        return -y
+    if not _clips(p):
+        return y
+    unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1])
+    return min(y, unclipped) if mode == CLOSED else min(y, -unclipped)
+
+
+@inline
+def gap_margin_slopes(p, x, xd, mode):
+    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
+    if mode == OPEN:
+        return -p[3], 0.0
+    y = p[3] * x - p[2]
+    if not _clips(p):
+        return p[3], 0.0
+    by_x = p[0] * p[3] / (p[0] + p[1])
+    by_rate = p[1] * p[3] / (p[0] + p[1])
+    unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1])
+    if mode == CLOSED:
+        if y <= unclipped:
+            return p[3], 0.0
+        return by_x, by_rate
+    if y <= -unclipped:
+        return p[3], 0.0
+    return -by_x, -by_rate
+
+
+@inline
 def gap_margins(p, mode):
     """How many margins a mode has: in contact, with clip, that of contact and that of the force."""
     return 2 if mode != OPEN and _clips(p) else 1
@@ -45,43 +77,14 @@ def gap_margins(p, mode):
 
 @inline
 def gap_one_margin(p, which, x, xd, mode):
-    """One margin and its slopes by x, xd and time: in contact, up to where contact is lost (m), then that of the force
-    before it is cut off, divided by k + c."""
+    """One margin and its slopes by x, xd and time: in contact, up to where contact is lost, then that of the force."""
     y = p[3] * x - p[2]
     if mode == OPEN:
         return -y, -p[3], 0.0, 0.0
     if which == 0:
         return y, p[3], 0.0, 0.0
-    unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1])
-    by_x = p[0] * p[3] / (p[0] + p[1])
-    by_rate = p[1] * p[3] / (p[0] + p[1])
-    if mode == CLOSED:
-        return unclipped, by_x, by_rate, 0.0
-    return -unclipped, -by_x, -by_rate, 0.0
-
-
-@inline
-def _least(p, x, xd, mode):
-    """The number of the margin that is the least."""
-    if mode == OPEN or not _clips(p):
-        return 0
-    contact, _, _, _ = gap_one_margin(p, 0, x, xd, mode)
-    force, _, _, _ = gap_one_margin(p, 1, x, xd, mode)
-    return 0 if contact <= force else 1
-
-
-@inline
-def gap_margin(p, x, xd, mode):
-    """How far a member is from the end of its mode: the least of its margins."""
-    s, _, _, _ = gap_one_margin(p, _least(p, x, xd, mode), x, xd, mode)
-    return s
-
-
-@inline
-def gap_margin_slopes(p, x, xd, mode):
-    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
-    _, by_x, by_rate, _ = gap_one_margin(p, _least(p, x, xd, mode), x, xd, mode)
-    return by_x, by_rate
+    sign = (1.0 if mode == CLOSED else -1.0) / (p[0] + p[1])
+    return sign * (p[0] * y + p[1] * p[3] * xd), sign * p[0] * p[3], sign * p[1] * p[3], 0.0
 
 
 @inline
@@ -101,15 +104,13 @@ def gap_slopes(p, place, x, xd, mode):
 @inline
 def gap_margin_slope(p, place, x, xd, mode):
     """The slope of the margin, which says how far the mode is from its end, by a parameter."""
-    if mode == OPEN:
-        return 1.0 if place == 2 else 0.0
-    if _least(p, x, xd, mode) == 0:
-        return -1.0 if place == 2 else 0.0
     y = p[3] * x - p[2]
+    unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1]) if _clips(p) else y
+    if mode == OPEN or not _clips(p) or y <= (unclipped if mode == CLOSED else -unclipped):
+        return (0.0 if place != 2 else 1.0) if mode == OPEN else (0.0 if place != 2 else -1.0)
     sign = (1.0 if mode == CLOSED else -1.0) / (p[0] + p[1])
     if place == 2:
         return -sign * p[0]
-    unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1])
     return sign * ((y if place == 0 else p[3] * xd) - unclipped)
 
 

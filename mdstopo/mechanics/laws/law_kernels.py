@@ -35,9 +35,8 @@ class Modes:
     margin_by_time: its slope by time; None where it does not depend on it.
     margin_rest_slope: its slope by the free length at fixed elongation; None where there is none.
     margins (p, mode, curves), one_margin: of a law whose margin is the least of several, how many there are in a mode,
-    and one of them by its number `which`, with its slopes by x, xd and t, from which `margin` and `margin_slopes` then
-    follow; None where there is one. Each has to be as smooth as the motion: a member that leaves its mode and comes
-    back within a step is found on a cubic through each.
+    and one of them by its number `which`, with its slopes by x, xd and t; None where there is one. Each has to be as
+    smooth as the motion: a member that leaves its mode and comes back within a step is found on a cubic through each.
     next_mode: where to go behind the end. first_mode: at the start of the motion.
     switches (p, curves): whether this law has several modes at all; None where it always has.
     idle (mode): whether nothing acts and nothing is stored in a mode; None where that is true of none.
