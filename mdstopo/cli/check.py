@@ -124,7 +124,7 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
         output.say(f"load case {name}: {freedom} degrees of freedom")
         redundant = engine.scenes[name].redundant
         if redundant:
-            output.say(f"load case {name}: joints with rows that others imply: {', '.join(redundant)}")
+            output.say(f"load case {name}: joints with equations that follow from other joints: {', '.join(redundant)}")
     document["degrees_of_freedom"] = max(freedoms.values())
     for name in freedoms:
         rest = engine.settled(case.initial, name)

@@ -60,7 +60,7 @@ def command(
     if (keep is None) == (threshold is None):
         raise click.UsageError("say --keep or --threshold, one of them")
     if threshold is not None and not math.isfinite(threshold):
-        raise click.BadParameter(f"{threshold} is no alpha", param_hint="--threshold")
+        raise click.BadParameter(f"{threshold} is no alpha, which is a finite number", param_hint="--threshold")
     from mdstopo.finalize.finalize_design import finalize, opened, ready, tied
     from mdstopo.store.atomic import replace_file
     from mdstopo.store.result_reader import read_result

@@ -167,7 +167,9 @@ def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str,
             words = f"the {method} method does not go with {case.solver.integrator}, only with {listed(on)}"
             raise CaseError([case.marks.mistake("solver.integrator", words)], str(case_path))
         if case.solver.integrator == AUTO:
-            output.notice(f"{method} belongs to {on[0]}: all methods use that integrator, to be comparable")
+            output.notice(
+                f"the {method} method goes with {on[0]} alone: gradients by all methods are those of that integrator"
+            )
             return replace(case, solver=replace(case.solver, integrator=on[0]))
     return case
 

@@ -38,7 +38,9 @@ if TYPE_CHECKING:
 @click.command("simulate")
 @case_argument
 @alpha_option
-@click.option("--load-case", "names", multiple=True, metavar="NAME", help="Only this one; may be repeated.")
+@click.option(
+    "--load-case", "names", multiple=True, metavar="NAME", help="Simulate this load case alone; may be repeated."
+)
 @out_option
 @overwrite_option
 @set_option

@@ -135,7 +135,7 @@ def cache_folder() -> Path:
 
 @functools.cache
 def _folder(foreign: str) -> Path:
-    """`cache_folder`; foreign: a hash of what `include` has added."""
+    """What `cache_folder` gives, made where it is not there. foreign: the hash of sources that `include` has added."""
     folder = cache_root() / f"kernels-{_key()}{'-' if foreign else ''}{foreign}"
     new = not folder.exists()
     if not make_private(folder):

@@ -28,7 +28,10 @@ MOST_GROUND = 60
 def draw(
     module: Any, source: Source, load_case: str | None = None, times: tuple[float, ...] = (), overlay: bool = False
 ) -> Any:
-    """One panel a time, the start where none is given. overlay: all in one, the earlier the fainter."""
+    """Draw the scene in one panel for each time (s), at the start where no time is given.
+
+    overlay: draw all times into one panel, earlier ones fainter.
+    """
     case = source.case
     panels: list[tuple[float | None, Floats]] = [(None, start_state(case))]
     if times:

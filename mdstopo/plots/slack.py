@@ -15,8 +15,8 @@ SLACK, DEEPEST, CORNERS = 1e-3, 0.3, 13
 
 
 def spare_length(case: Case, group: MemberGroup, q: Floats) -> Floats:
-    """(M,) by how much each member is longer than its ends are apart at a state q, m; 0 where it is taut, and of a
-    group that does more than pull beyond a gap.
+    """By how much each member of a group is longer than the distance of its ends at a state q, (M,) in m; 0 where it is
+    taut. Of a group whose members are no belts, which only pull from some elongation on, all are 0.
 
     A belt whose gap, or free length, is a design variable is taken as if it had none.
     """

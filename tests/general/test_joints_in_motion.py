@@ -77,7 +77,7 @@ def test_a_redundant_link_changes_no_motion_and_shares_the_load(integrator):
 def test_a_response_on_a_redundant_joint_is_refused():
     extra = "  - {name: middle, type: distance, bodies: [ground, coupler], at: [[0.5, 0], [0.5, -1]]}"
     text = PARALLELOGRAM.format(extra=extra) + "objectives: {F: {response: {joint_force: {joint: middle}}}}\n"
-    with pytest.raises(mdstopo.CaseError, match="middle has rows that others imply"):
+    with pytest.raises(mdstopo.CaseError, match="middle has equations that follow from other joints"):
         mdstopo.evaluate(read_case(text))
 
 

@@ -78,7 +78,7 @@ def test_a_key_that_is_no_number_of_the_scene_is_refused(key, words):
         ({"normal": {"deviation": 0}}, "normal.deviation", "found 0, allowed is a number > 0"),
         ({"normal": {"mean": 3}}, "normal", "the key 'deviation' is missing"),
         ({"normal": {"deviation": 1, "from": 70, "to": 60}}, "normal.to", "allowed is a number above 70"),
-        ({"normal": {"deviation": 1, "from": 90}}, "normal", "next to nothing of the distribution"),
+        ({"normal": {"deviation": 1, "from": 90}}, "normal", "hardly any probability of the distribution"),
         ({"uniform": {"from": 2, "to": 2}}, "uniform.to", "found 2, allowed is a number above 2"),
         ({"lognormal": {"mean": -1, "deviation": 1}}, "lognormal.mean", "found -1, allowed is a number > 0"),
         ({"discrete": [[1, 0.5], [2, 0.4]]}, "discrete", "found probabilities of sum 0.9"),

@@ -54,7 +54,7 @@ def test_check_prints_joints_degrees_of_freedom_and_redundancies(said: Say, tmp_
     text = said("check", case)
     assert "4 joints" in text
     assert "1 degrees of freedom" in text
-    assert "joints with rows that others imply: last" in text
+    assert "joints with equations that follow from other joints: last" in text
     assert "principal moments" in text
     document = json.loads(said("check", CASES / "springs.yaml", "--json"))
     assert document["degrees_of_freedom"] == 6

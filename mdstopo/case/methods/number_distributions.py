@@ -78,7 +78,7 @@ class Normal(Distribution):
             return None
         reach = 6.0 * stated["deviation"]
         if (low is not None and low > mean + reach) or (high is not None and high < mean - reach):
-            reading.mistake(path, "next to nothing of the distribution is between `from` and `to`")
+            reading.mistake(path, "hardly any probability of the distribution is between `from` and `to`")
             return None
         return cls(mean, stated["deviation"], low, high)
 

@@ -173,7 +173,8 @@ def build_constraints(
 
 
 def _lengths_vary(row: VolumeRow, groups: dict[str, MemberGroup] | None, variables: tuple[Variable, ...]) -> bool:
-    """Whether members that a row sums up cost a length that varies: then what it comes to is not known here."""
+    """Whether members of a volume row cost their length, and their ends are design variables: the volume that the row
+    limits can then not be told from alpha alone."""
     moving = {each.points for each in variables if each.points}.union(*(each.moved for each in variables))
     return any(groups[name].cost_varies(moving) for name in row.groups if groups is not None and name in groups)
 

@@ -125,7 +125,7 @@ def _scenarios(fields: Fields, root: Node, numbers: set[str], reading: Reading) 
     shares = [1.0] * len(stated)
     if given and len(given) < len(stated):
         lacking = listed(name for name in stated if name not in given)
-        reading.mistake(path, f"the probability of {lacking} is missing; all scenarios have one, or none")
+        reading.mistake(path, f"the probability of {lacking} is missing; either all scenarios state one, or none does")
     elif given and all(stated[name]["probability"] is not BAD for name in given):
         shares = [keys["probability"] for keys in stated.values()]
         if abs(math.fsum(shares) - 1.0) > ROUNDED:

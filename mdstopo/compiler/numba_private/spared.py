@@ -219,7 +219,7 @@ def _spare_contexts() -> None:
     given: Any = _ERRORS.new_error_context
 
     class Context:
-        """Numba's own, made when it is needed."""
+        """In the place of Numba's context of an error, which it makes only where an error is raised."""
 
         __slots__ = ("_named", "_parts")
 

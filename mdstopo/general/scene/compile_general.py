@@ -224,7 +224,8 @@ def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...
             mistakes.append(
                 case.marks.mistake(
                     f"{path}.response",
-                    f"joint {names[0]} has rows that others imply at the start; what it transmits is not determined",
+                    f"joint {names[0]} has equations that follow from other joints at the start; "
+                    "its forces are not determined",
                 )
             )
     if mistakes:

@@ -17,7 +17,7 @@ from mdstopo.mechanics.laws.sums import add_tangent, upper_triangle
 
 @kernel
 def _seen(member, width, i, r):
-    """R q, 1/L, b and Delta of the members from i on."""
+    """Geometry of the members from i on: Q in the frame of P (two numbers), 1/L, its row of B (three), Delta."""
     ax, ay, rx, ry, _, y, stretch = seen_members(member, width, i, r, np.bool_(True))
     bx = y * rx
     by = y * ry

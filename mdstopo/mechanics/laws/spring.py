@@ -567,7 +567,8 @@ def meeting_in(px, py, qx, qy, l0, k, preload, before, after):
 
 @kernel
 def passing_in(px, py, qx, qy, l0, k, preload, before, after, least):
-    """First member whose ends pass between two relative poses, much nearer than they move, under a force; else -1.
+    """The first member whose two ends pass by each other between two relative poses, at a distance much smaller than
+    the one that they move, while it carries a force; -1 where there is none.
 
     px, py, qx, qy (n,): points P and Q in the frames of their bodies (m).
     l0 (n,): free lengths (m).
