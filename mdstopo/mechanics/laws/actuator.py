@@ -22,31 +22,6 @@ def actuator_force(p, x, xd, mode):
 
 
 @inline
-def actuator_margin(p, x, xd, mode):
-    """How far the force is from the end of its mode, in parts of the limit; infinite where there is no limit."""
-    if p[3] <= 0.0:
-        return np.inf
-    f = (p[0] * (x - p[2]) + p[1] * xd) / p[3]
-    if mode == UPPER:
-        return f - 1.0
-    if mode == LOWER:
-        return -1.0 - f
-    return 1.0 - abs(f)
-
-
-@inline
-def actuator_margin_slopes(p, x, xd, mode):
-    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
-    if p[3] <= 0.0:
-        return 0.0, 0.0
-    f = p[0] * (x - p[2]) + p[1] * xd
-    sign = 1.0 / p[3]
-    if mode == LOWER or (mode == LINEAR and f >= 0.0):
-        sign = -sign
-    return sign * p[0], sign * p[1]
-
-
-@inline
 def actuator_margins(mode):
     """How many margins a mode has: in the linear one there are two limits."""
     return 2 if mode == LINEAR else 1
@@ -54,8 +29,8 @@ def actuator_margins(mode):
 
 @inline
 def actuator_one_margin(p, which, x, xd, mode):
-    """One margin and its slopes by x, xd and time, where there is a limit: in the linear mode up to the upper one, then
-    to the lower one."""
+    """One margin, in parts of the limit, and its slopes by x, xd and time, where there is a limit: in the linear mode
+    up to the upper one, then to the lower one."""
     f = (p[0] * (x - p[2]) + p[1] * xd) / p[3]
     sign = 1.0 / p[3]
     if mode == UPPER:
@@ -63,6 +38,30 @@ def actuator_one_margin(p, which, x, xd, mode):
     if mode == LINEAR and which == 1:
         return 1.0 + f, sign * p[0], sign * p[1], 0.0
     return (1.0 if mode == LINEAR else -1.0) - f, -sign * p[0], -sign * p[1], 0.0
+
+
+@inline
+def _least(p, x, xd):
+    """The number of the margin that is the least in the linear mode: of the limit that the force points to."""
+    return 0 if p[0] * (x - p[2]) + p[1] * xd >= 0.0 else 1
+
+
+@inline
+def actuator_margin(p, x, xd, mode):
+    """How far the force is from the end of its mode, in parts of the limit; infinite where there is no limit."""
+    if p[3] <= 0.0:
+        return np.inf
+    s, _, _, _ = actuator_one_margin(p, _least(p, x, xd), x, xd, mode)
+    return s
+
+
+@inline
+def actuator_margin_slopes(p, x, xd, mode):
+    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
+    if p[3] <= 0.0:
+        return 0.0, 0.0
+    _, by_x, by_rate, _ = actuator_one_margin(p, _least(p, x, xd), x, xd, mode)
+    return by_x, by_rate
 
 
 @inline

@@ -33,17 +33,6 @@ def crush_idle(mode):
 
 
 @inline
-def crush_margin(p, x, xd, mode):
-    """How far the mode is from its end: y or what is left to the plateau in m, or the rate in m/s."""
-    if mode == CRUSHING:
-        return p[3] * xd
-    y = p[3] * x - p[2]
-    if mode == OPEN:
-        return -y
-    return min(y, p[1] / p[0] - y)
-
-
-@inline
 def crush_margins(mode):
     """How many margins a mode has: while it is elastic a member may lose contact, or reach its plateau."""
     return 2 if mode == ELASTIC else 1
@@ -64,13 +53,23 @@ def crush_one_margin(p, which, x, xd, mode):
 
 
 @inline
+def _nears_plateau(p, x):
+    """Whether a member that is elastic is nearer to its plateau than to losing contact."""
+    return p[3] * x - p[2] > 0.5 * p[1] / p[0]
+
+
+@inline
+def crush_margin(p, x, xd, mode):
+    """How far the mode is from its end: y or what is left to the plateau in m, or the rate in m/s."""
+    s, _, _, _ = crush_one_margin(p, 1 if _nears_plateau(p, x) else 0, x, xd, mode)
+    return s
+
+
+@inline
 def crush_margin_slopes(p, x, xd, mode):
     """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
-    if mode == CRUSHING:
-        return 0.0, p[3]
-    if mode == OPEN or p[3] * x - p[2] > 0.5 * p[1] / p[0]:
-        return -p[3], 0.0
-    return p[3], 0.0
+    _, by_x, by_rate, _ = crush_one_margin(p, 1 if _nears_plateau(p, x) else 0, x, xd, mode)
+    return by_x, by_rate
 
 
 @inline
@@ -95,7 +94,7 @@ def crush_margin_slope(p, place, x, mode):
         return 0.0
     if mode == OPEN:
         return 1.0 if place == 2 else 0.0
-    if p[3] * x - p[2] <= 0.5 * p[1] / p[0]:
+    if not _nears_plateau(p, x):
         return -1.0 if place == 2 else 0.0
     if place == 2:
         return 1.0
@@ -116,7 +115,7 @@ def crush_next(p, x, mode):
     decide."""
     if mode != ELASTIC:
         return ELASTIC
-    return CRUSHING if p[3] * x - p[2] > 0.5 * p[1] / p[0] else OPEN
+    return CRUSHING if _nears_plateau(p, x) else OPEN
 
 
 @inline
@@ -150,7 +149,7 @@ def crush_grazes(p, x, mode):
 
     A plateau that is only just reached leaves a permanent set on one side and none on the other.
     """
-    return 2 if mode == ELASTIC and p[3] * x - p[2] > 0.5 * p[1] / p[0] else 0
+    return 2 if mode == ELASTIC and _nears_plateau(p, x) else 0
 
 
 @inline

@@ -78,30 +78,6 @@ def curve_start(p, x, xd, xdd, curves):
 
 
 @inline
-def curve_margin(p, x, mode, curves):
-    """How far the elongation x is from the end of its piece of the curve (m)."""
-    at = int(p[0])
-    n = int(p[1])
-    if mode <= 0:
-        return np.inf
-    below = x - curves[at + mode - 2] if mode > 1 else np.inf
-    above = curves[at + mode - 1] - x if mode <= n else np.inf
-    return min(below, above) + p[3]
-
-
-@inline
-def curve_margin_slopes(p, x, mode, curves):
-    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
-    at = int(p[0])
-    n = int(p[1])
-    if mode <= 0:
-        return 0.0, 0.0
-    if mode == 1 or (mode <= n and curves[at + mode - 1] - x < x - curves[at + mode - 2]):
-        return -1.0, 0.0
-    return 1.0, 0.0
-
-
-@inline
 def curve_margins(p, mode):
     """How many ends a piece of the curve has; none where steps need not end at knots."""
     if mode <= 0:
@@ -117,6 +93,34 @@ def curve_one_margin(p, which, x, mode, curves):
     if which == 0 and mode > 1:
         return x - curves[at + mode - 2] + p[3], 1.0, 0.0, 0.0
     return curves[at + mode - 1] - x + p[3], -1.0, 0.0, 0.0
+
+
+@inline
+def _least(p, x, mode, curves):
+    """The number of the margin that is the least, of a piece that has one."""
+    if curve_margins(p, mode) < 2:
+        return 0
+    below, _, _, _ = curve_one_margin(p, 0, x, mode, curves)
+    above, _, _, _ = curve_one_margin(p, 1, x, mode, curves)
+    return 1 if above < below else 0
+
+
+@inline
+def curve_margin(p, x, mode, curves):
+    """How far the elongation x is from the end of its piece of the curve (m)."""
+    if mode <= 0:
+        return np.inf
+    s, _, _, _ = curve_one_margin(p, _least(p, x, mode, curves), x, mode, curves)
+    return s
+
+
+@inline
+def curve_margin_slopes(p, x, mode, curves):
+    """Slopes of the margin, which says how far the mode is from its end, by x and xd."""
+    if mode <= 0:
+        return 0.0, 0.0
+    _, by_x, by_rate, _ = curve_one_margin(p, _least(p, x, mode, curves), x, mode, curves)
+    return by_x, by_rate
 
 
 def curve_data(record: CurveLaw, at: int) -> tuple[list[float], list[float]]:

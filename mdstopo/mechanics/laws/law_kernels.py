@@ -37,6 +37,7 @@ class Modes:
     margins (p, mode, curves), one_margin: of a law whose margin is the least of several, how many there are in a mode,
     and one of them by its number `which`, with its slopes by x, xd and t; None where there is one. Each has to be as
     smooth as the motion: a member that leaves its mode and comes back within a step is found on a cubic through each.
+    `margin` and `margin_slopes` may be those of the least of them, as in `crush`.
     next_mode: where to go behind the end. first_mode: at the start of the motion.
     switches (p, curves): whether this law has several modes at all; None where it always has.
     idle (mode): whether nothing acts and nothing is stored in a mode; None where that is true of none.
