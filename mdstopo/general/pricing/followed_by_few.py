@@ -375,8 +375,17 @@ def _sort_part(tile, s, first, few):
             model, np.int64(FEW_AT), count, candidates.node_pose[o + m], candidates.node_change[o + m], few.works[m]
         )
     classes[:] = 0
-    _move_rows(tile.height, few)
     near = np.int64(0)
+    if few.size[BETWEEN_ROWS] != 0 and _is_of_one_mode(few):
+        mode = few.row_mode[0]
+        _bound_all(few)
+        if _all_stay(code, p, model.curves, t, mode, few.box[0]):
+            own = join_class(mode, mode, size * tile.height, classes)
+            row_class[:] = own
+            for a in range(tile.height):
+                kind[a * BROAD + first : a * BROAD + first + size] = own
+            return
+    _move_rows(tile.height, few)
     for a in range(tile.height):
         box = few.box[a]
         box[LOW] -= few.sets[a, 1]
@@ -391,6 +400,57 @@ def _sort_part(tile, s, first, few):
                 continue
         near = _sort_row(tile, s, a, first, box, few, near)
     sort_known_places(model, candidates, k, s, sorting.places, near, tile.lists.modes[0], tile.lists.sets[0], sorting)
+
+
+@part
+def _is_of_one_mode(few):
+    """Whether the members of all rows are in one mode."""
+    mode = few.row_mode[0]
+    found = mode != UNSURE
+    for a in range(1, TALL):
+        found = found and few.row_mode[a] == mode
+    return found
+
+
+@kernel
+def _bound_all(few):
+    """Write the range of elongations less permanent sets, and of rates, of all members of a part at the nodes of a
+    step but for the first into row 0 of the box of a `FewMembers`, of a part whose rows follow from others.
+
+    They are bilinear in the places of both points, between what they are at the corners, but for a rest that is known
+    at the few members.
+    """
+    works, box, node, row_node = few.works, few.box, few.column_node, few.row_node
+    works = works.reshape(works.size)
+    rows = few.size[ROWS]
+    for q in range(2):
+        low = np.inf
+        high = -np.inf
+        off = zero()
+        for m in range(1, NODES):
+            begin = (m * WORKS + (ELONGATION if q == 0 else RATE)) * MOST_FEW
+            end = begin + (rows - 1) * COLUMN_NODES
+            first, second = works[begin], works[begin + COLUMN_NODES - 1]
+            third, fourth = works[end], works[end + COLUMN_NODES - 1]
+            low = min(low, min(min(first, second), min(third, fourth)))
+            high = max(high, max(max(first, second), max(third, fourth)))
+            for r in range(rows):
+                share = 0.5 * (1.0 + row_node[r])
+                one = first + share * (third - first)
+                other = second + share * (fourth - second)
+                for b in range(0, COLUMN_NODES, lanes()):
+                    value = load(node, b) * (0.5 * (other - one)) + 0.5 * (one + other)
+                    off = larger(magnitude(load(works, begin + r * COLUMN_NODES + b) - value), off)
+        more = BETWEEN * BETWEEN * largest(off)
+        box[0, LOW if q == 0 else SLOWEST] = low - more
+        box[0, HIGH if q == 0 else FASTEST] = high + more
+    least = few.sets[0, 0]
+    most = few.sets[0, 1]
+    for a in range(1, TALL):
+        least = min(least, few.sets[a, 0])
+        most = max(most, few.sets[a, 1])
+    box[0, LOW] -= most
+    box[0, HIGH] -= least
 
 
 @kernel
