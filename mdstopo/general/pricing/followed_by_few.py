@@ -225,8 +225,8 @@ def _choose(tile, level, first, few):
 
 @kernel
 def _is_enough(tile, few):
-    """Whether elongations and rates of all members of a part follow from those of a few of them: at the beginnings of
-    all steps, between which they hardly change.
+    """Whether elongations and rates of all members of a part follow from those of a few of them: at the ends of all
+    steps, between which they hardly change.
 
     tile, few: as of `_choose`.
     """
@@ -236,7 +236,7 @@ def _is_enough(tile, few):
     for s in range(run[FIRST_STEP], run[LAST_STEP]):
         if candidates.step[s, KIND] == POINT:
             continue
-        o = candidates.step[s, FIRST_NODE]
+        o = candidates.step[s, FIRST_NODE] + NODES - 1
         member_works(
             tile.model, np.int64(FEW_AT), count, candidates.node_pose[o], candidates.node_change[o], few.works[0]
         )
