@@ -185,7 +185,7 @@ MODES: dict[str, dict[str, Any]] = {
 #: laws by whose candidates passes go, in a plane and in space
 PASSES: dict[int, tuple[str, ...]] = {
     2: ("cubic", "props", *MODES),
-    3: ("props",),
+    3: ("props", "crushed legs"),
 }
 
 

@@ -83,6 +83,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "front/test_starts.py": ("with_several_starts_ends_the_same", "resumed_with_another_number"),
     "general/test_candidate_prices.py": (
         "in_space",
+        "crushed_by_different_lengths",
         "become_shorter[crushed later",
         "become_shorter[slack, mean",
         "become_shorter[slack, root",

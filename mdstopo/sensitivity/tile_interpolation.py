@@ -34,6 +34,9 @@ ALL_ROWS = 2
 LEVELS = 4
 SHORT = BROAD >> (LEVELS - 1)
 PARTS = BROAD // SHORT
+#: from how many members others may follow; members that the model holds for a tile: all of it twice, and these
+MOST_FEW = TALL * COLUMN_NODES
+ROOM = 2 * PLACES + MOST_FEW
 #: by so much the last coefficient falls where a part is halved
 FALLS = 2.0 ** (COLUMN_NODES - 1)
 #: the last coefficient but one may be so many times what is allowed: the next ones fall at least as fast as that
@@ -286,7 +289,7 @@ def take_prices(grids, i, j, error, scratch, price):
     worst = 0.0
     fill_weights(grids[1], j * BROAD + plan[BEGIN], size, COLUMN_NODE[plan[LEVEL]], node, weight)
     for a in range(height):
-        worst = _worse(worst, _tail(found, a * wide, 1, node, weight))
+        worst = worse(worst, tail(found, a * wide, 1, node, weight))
     if not worst <= error:
         more = 1.0
         if worst > error:  # not where it is no number
@@ -298,7 +301,7 @@ def take_prices(grids, i, j, error, scratch, price):
         row_weight = np.empty(height)
         fill_weights(grids[0], i * TALL, np.int64(TALL), ROW_NODE[plan[TRIED_ROWS]], row_node, row_weight)
         for b in range(wide):
-            worst = _worse(worst, _tail(found, b, wide, row_node, row_weight))
+            worst = worse(worst, tail(found, b, wide, row_node, row_weight))
         if not worst <= error:
             plan[TRIED_ROWS] += 1
             plan[FIRST_ROWS] = max(plan[FIRST_ROWS], plan[TRIED_ROWS])
@@ -311,7 +314,7 @@ def take_prices(grids, i, j, error, scratch, price):
     first = j * BROAD + plan[BEGIN]
     if plan[SHARES] != 1 + first * LEVELS + plan[LEVEL]:
         plan[SHARES] = 1 + first * LEVELS + plan[LEVEL]
-        _along_columns(grids[1], first, size, node, weight, buffer)
+        fill_column_shares(grids[1], first, size, node, weight, buffer)
     _spread(buffer, extent(grids, i, j)[0], plan[BEGIN], size, price)
     _put_off(level, smallest, size, DONE)
 
@@ -340,7 +343,7 @@ def fill_weights(numbers, first, size, chosen, node, weight):
 
 
 @part
-def _tail(values, first, step, node, weight):
+def tail(values, first, step, node, weight):
     """The last coefficient of the Chebyshev series through values at nodes, or a share of the one before, if larger.
 
     values: from `first` on, `step` apart. node, weight: of `fill_weights`.
@@ -358,7 +361,7 @@ def _tail(values, first, step, node, weight):
 
 
 @part
-def _worse(one, other):
+def worse(one, other):
     """The larger of two numbers; what is no number is infinite."""
     return max(one, other) if other == other else np.inf
 
@@ -409,7 +412,20 @@ def _along_rows(numbers, i, node, weight, found, out):
 
 
 @kernel
-def _along_columns(numbers, first, size, node, weight, out):
+def fill_row_shares(numbers, i, node, weight, out):
+    """By how much values at nodes of rows count in each row of a tile: out (TALL, nodes or more).
+
+    numbers (n,), i: of the points of the first grid, and the strip.
+    node, weight (nodes,): of `fill_weights`.
+    """
+    first = i * TALL
+    for a in range(TALL):
+        share = out[a, : node.shape[0]]
+        _shares(numbers, first + a, numbers[first], numbers[first + TALL - 1], node, weight, share)
+
+
+@kernel
+def fill_column_shares(numbers, first, size, node, weight, out):
     """By how much values at the nodes of columns count at each of these: out (COLUMN_NODES or more, size or more).
 
     numbers (n,), first, size: of the points of the second grid, and the part of it.

@@ -13,7 +13,7 @@ from mdstopo.case.scene import candidates
 from mdstopo.case.scene.candidates import with_members
 from mdstopo.engine import Evaluator
 from mdstopo.general.model.priced_candidates import FIRST_STAGE, KIND, POINT
-from mdstopo.sensitivity.springs_candidate_prices import ERROR
+from mdstopo.sensitivity.springs_candidate_prices import COMPUTED, ERROR
 from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
 from tests.sensitivity.test_candidate_prices import assert_dense_pass_is_right
 from tests.tiers import examples
@@ -546,6 +546,18 @@ def test_a_pass_knows_members_that_are_crushed_in_steps_so_short_that_rounding_d
 
 def test_a_dense_pass_in_space_by_legs_that_are_crushed_knows_all_prices():
     assert_pass_is_right(*states_of(dense(in_space(DENSE["crushed"], **ENERGY)), 0.2))
+
+
+def test_a_pass_computes_few_of_the_members_that_are_crushed_by_different_lengths(monkeypatch):
+    """Within a tile members are crushed by millimetres more or less, and begin and end to be so in different steps. As
+    many are built as in the first round of a run, which hold the arm."""
+    monkeypatch.undo()
+    law = {**DENSE["crushed"], "side": "compression"}
+    candidates, states = states_of(dense(arm(law, **looked(PUSH, "rms")), 0.05), 0.2)
+    assert_pass_is_right(candidates, states)
+    every = np.arange(candidates.shape[0] * candidates.shape[1])
+    tiles, _ = candidates.tiles(states, candidates.common(states, 0.0), every)
+    assert tiles[:, COMPUTED].max() < 0.12 * TALL * BROAD
 
 
 @pytest.mark.parametrize("name", ["slack", "damped and clipped", "steered", "crushed"])

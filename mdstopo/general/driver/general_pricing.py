@@ -38,7 +38,7 @@ from mdstopo.scene.bodies import stands_as
 from mdstopo.scene.origin import starting_places
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.sensitivity.candidate_pass import SMOOTH_ERROR, CandidatePass
-from mdstopo.sensitivity.tile_interpolation import PLACES
+from mdstopo.sensitivity.tile_interpolation import PLACES, ROOM
 
 if TYPE_CHECKING:
     from mdstopo.general.driver.general_driver import GeneralDriver
@@ -219,7 +219,7 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             active=np.ones((segments, 1), dtype=np.int64),
             level=np.zeros((segments, 1, 2)),
             power=np.ones(1),
-            member=np.zeros((len(model.member), 2 * PLACES)),
+            member=np.zeros((len(model.member), ROOM)),
             curves=np.zeros(_most_curves(states)),
         )
         return pack_general(with_tile, scene.kinematics)

@@ -97,7 +97,7 @@ def price_tiles(
     """Price tiles of the members from every point of one grid to every point of another.
 
     In:
-      ints, floats, candidate_ints, candidate_floats: as of `price_places`, with room for 2 PLACES members.
+      ints, floats, candidate_ints, candidate_floats: as of `price_places`, with room for ROOM members.
       first_numbers, second_numbers, smooth_rows, smooth_columns: of `tile_interpolation.smoothness`.
       common (COMMON,): what candidates have in common, as of `sensitivity.springs_candidate_prices`.
       built (T + 1,), places (any,): by tile, where in it candidates are that do not count.

@@ -7,12 +7,12 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.pricing.certain_modes import make_spans
-from mdstopo.general.pricing.loaded_members import load_all
+from mdstopo.general.pricing.loaded_members import load_all, loaded_at
 from mdstopo.general.pricing.sorted_members import make_sorting
-from mdstopo.general.pricing.switching_prices import make_following
+from mdstopo.general.pricing.switching_prices import make_following, price_point
 from mdstopo.general.pricing.switching_together import make_switching
 from mdstopo.mechanics.kinematics.kinematics_interface import WORKS
-from mdstopo.sensitivity.tile_interpolation import LEVELS, PARTS, PLACES, begin_tile, extent
+from mdstopo.sensitivity.tile_interpolation import BROAD, LEVELS, PARTS, PLACES, begin_tile, extent
 
 #: parts of a tile of all levels that have lists, of which those of a level begin at 2^level - 1
 LISTED_PARTS = 2**LEVELS - 1
@@ -25,7 +25,7 @@ SETS = 3
 LOADED = PARTS
 
 #: the arrays of a `StepLists`
-LISTS = ("step", "told", "count", "shared", "modes", "sets", "todo", "found", "fresh", "whole", "works")
+LISTS = ("step", "told", "count", "shared", "modes", "sets", "todo", "left", "found", "fresh", "whole", "works")
 #: the parts of a `PricedTile`
 FIELDS = (
     "model", "candidates", "k", "grids", "i", "j", "height", "width", "error", "lists", "scratch", "spans", "following",
@@ -40,8 +40,9 @@ class StepLists:
     (LISTED_PARTS,): how many these are. shared (LISTED_PARTS, SHARED): what the members of each part have in common.
     modes, sets (2, PLACES): of members at the start of a step, or behind a whole one; and behind a part of one. todo
     (PARTS + 1,): 1 for each of the smallest parts that is not listed for the step; at LOADED whether members are
-    loaded. found (SETS, PLACES): prices. fresh (PLACES,): the permanent sets with which members end a step. whole (2,
-    PLACES): points of all places. works (WORKS, PLACES): what members do at a state.
+    loaded. left (PARTS,): 1 for each of the smallest parts that is gone through step by step. found (SETS, PLACES):
+    prices. fresh (PLACES,): the permanent sets with which members end a step. whole (2, PLACES): points of all places.
+    works (WORKS, PLACES): what members do at a state.
     """
 
     def __init__(self, *_arrays: Any) -> None: ...
@@ -50,8 +51,8 @@ class StepLists:
 class PricedTile:
     """A tile, the law by which it is priced, and all arrays that this takes, inside kernels.
 
-    model: with room for 2 PLACES members, which are overwritten. candidates, k: a `PricedCandidates`, and the number of
-    the run. grids, i, j, error: as of `tile_interpolation.take_prices`. height, width: rows and columns of the tile.
+    model: with room for ROOM members, which are overwritten. candidates, k: a `PricedCandidates`, and the number of the
+    run. grids, i, j, error: as of `tile_interpolation.take_prices`. height, width: rows and columns of the tile.
     lists: its `StepLists`. scratch, following, switching: of `tile_interpolation.make_scratch`, `make_following` and
     `make_switching`. spans: its `Spans`. sorting: a `Sorting`. price (PLACES,): of the members, added to.
     """
@@ -75,6 +76,7 @@ def make_lists(candidates):
         np.zeros((2, PLACES), np.int64),
         np.zeros((2, PLACES)),
         np.zeros(PARTS + 1, np.int64),
+        np.zeros(PARTS, np.int64),
         np.zeros((SETS, PLACES)),
         np.zeros(PLACES),
         np.zeros((2, PLACES), np.int64),
@@ -98,6 +100,7 @@ def begin_pricing(model, candidates, k, place, scratch, lists, price):
     lists.sets[:] = 0.0
     lists.shared[:] = 0.0
     lists.todo[LOADED] = 0
+    lists.left[:] = 1
     return PricedTile(
         model, candidates, k, grids, i, j, height, width, error, lists, scratch, make_spans(candidates.first.shape[1]),
         make_following(), make_sorting(), make_switching(), price,
@@ -110,3 +113,20 @@ def load_tile(tile):
     if tile.lists.todo[LOADED] == 0:
         load_all(tile.model, tile.candidates, tile.k, tile.grids, tile.i, tile.j, tile.lists.whole)
         tile.lists.todo[LOADED] = 1
+
+
+@kernel
+def add_points(tile, s, first, size, begun, ends):
+    """Add what the members of some columns do at a state alone.
+
+    tile: a `PricedTile`, with all its members in its model.
+    s: number of the state among the steps.
+    first, size: the first column, and how many there are.
+    begun: whether members are in modes. ends: the row of these among `modes`, and of the permanent sets.
+    """
+    modes, sets, price = tile.lists.modes, tile.lists.sets, tile.price
+    for a in range(tile.height):
+        for b in range(a * BROAD + first, a * BROAD + first + size):
+            price[b] += price_point(
+                tile.model, tile.candidates, tile.k, loaded_at(b), s, modes[ends, b], sets[ends, b], begun
+            )

@@ -54,13 +54,14 @@ SURE = 1e-11
 
 
 #: the arrays of a `Sorting`
-FIELDS = ("kind", "classes", "places", "mode", "works", "unsorted", "tried", "tangent")
+FIELDS = ("kind", "row_class", "classes", "places", "mode", "works", "unsorted", "tried", "tangent")
 
 
 class Sorting:
     """What sorting a tile needs, inside kernels.
 
-    kind (PLACES,): the class of each member. classes (CLASSES, CLASS_NUMBERS): what is known of each. places (PLACES,):
+    kind (PLACES,): the class of each member. row_class (TALL,): the class that all members of a row are in, or UNSORTED
+    where they may differ. classes (CLASSES, CLASS_NUMBERS): what is known of each. places (PLACES,):
     places of some members. mode (NODES,): of all members of a part at the nodes of a step. works (NODES, WORKS, MANY):
     what members do there. unsorted: 1 for each of the narrowest parts that is not sorted. tried (TRIED,), tangent:
     modes in which members may stay, and the tangents of their margins.
@@ -77,6 +78,7 @@ def make_sorting():
     """The arrays that sorting takes."""
     return Sorting(
         np.zeros(PLACES, np.int64),
+        np.full(TALL, UNSORTED, np.int64),
         np.zeros((CLASSES, CLASS_NUMBERS), np.int64),
         np.zeros(PLACES, np.int64),
         np.zeros(NODES, np.int64),
@@ -191,7 +193,7 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
         # a bit for each lane
         left = (1 << max(min(height - i % TALL, lanes()), 0)) - 1
         for n in range(count):
-            bits = _stay_in(n, i, sorting) & left
+            bits = stay_in(n, i, np.int64(0), sorting) & left
             for lane in range(lanes() if bits != 0 else 0):
                 at = _place(first, i + lane)
                 if (bits >> lane) & 1 == 1 and (not known or begin[at] == tried[n]):
@@ -243,7 +245,7 @@ def sort_places(model, candidates, k, s, places, count, modes, sorting):
                     if bits == 0:
                         continue
                     left &= ~bits
-                    own = join_class(tried[old], tried[new], _how_many(bits), classes)
+                    own = join_class(tried[old], tried[new], how_many(bits), classes)
                     for lane in range(lanes()):
                         if (bits >> lane) & 1 == 1:
                             kind[places[at + i + lane]] = own
@@ -255,6 +257,37 @@ def sort_places(model, candidates, k, s, places, count, modes, sorting):
                     )  # fmt: skip
                     own = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
                     kind[places[at + i + lane]] = own
+
+
+@kernel
+def sort_known_places(model, candidates, k, s, places, count, begin, kept, sorting):
+    """Sort some members of a tile of which it is known in which modes they begin.
+
+    In:
+      model: with the members of the tile (`load_all`).
+      candidates, k, s, begin, kept: as of `sort_members`.
+      places (count or more,), count: which members, and how many.
+    In place:
+      sorting: a `Sorting`: classes of the members are set, and added to those that there are.
+    """
+    kind, classes, mode, works = sorting.kind, sorting.classes, sorting.mode, sorting.works
+    code = candidates.run[k, CODE]
+    free = model.member[MEMBER_FREE_LENGTH]
+    mode[:] = UNSURE
+    for at in range(0, count, MANY):
+        wide = min(MANY, count - at)
+        take_members(model, places[at : at + wide], wide, (wide + WIDE - 1) // WIDE * WIDE)
+        for m in range(NODES):
+            o = candidates.step[s, FIRST_NODE] + m
+            member_works(model, np.int64(0), wide, candidates.node_pose[o], candidates.node_change[o], works[m])
+            for i in range(wide):
+                works[m, ELONGATION, i] -= kept[places[at + i]]
+        for i in range(wide):
+            place = places[at + i]
+            old, new = _modes_of(
+                code, candidates.law[k], model.curves, free[i], candidates.step_time[s], begin[place], mode, works, i
+            )  # fmt: skip
+            kind[place] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
 
 
 @part
@@ -300,7 +333,7 @@ def _that_go(inside, outside, other, alike):
 
 
 @part
-def _how_many(bits):
+def how_many(bits):
     """How many bits of a vector's lanes are set."""
     count = np.int64(0)
     for lane in range(lanes()):
@@ -372,16 +405,17 @@ def fill_tangents(code, p, curves, t, box, count, tried, tangent):
 
 
 @part
-def _stay_in(n, i, sorting):
+def stay_in(n, i, begin, sorting):
     """A bit for each member of a vector of them that stays in a mode.
 
     n, i: the number of the mode among those that were filled, and of the first member.
+    begin: the first node that is looked at: 1 where it is known that members begin in the mode, else 0.
     sorting: a `Sorting`.
     """
     mode, works, tried, tangent = sorting.mode, sorting.works, sorting.tried, sorting.tangent
     own = tangent[n]
     bits = (1 << lanes()) - 1
-    for m in range(NODES):
+    for m in range(begin, NODES):
         if mode[m] != UNSURE:
             bits = bits if mode[m] == tried[n] else 0
             continue

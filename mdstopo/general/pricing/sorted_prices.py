@@ -91,11 +91,11 @@ def price_part(tile, s, level, first, size, smooth, begun):
         if (idle or classes[c, COUNT] == 0) and not law_remembers(code):
             continue
         if stays or is_quick(code, candidates.law[k], model.curves):
-            done += _price_each(tile, s, first, size, c, to)
+            done += price_each(tile, s, first, size, c, to)
         else:
             for m in range(_list_places(tile, c, first, size)):
                 sorting.kind[places[m]] = UNSORTED
-    return done + _follow_others(tile, s, first, size, begun, to)
+    return done + follow_others(tile, s, first, size, begun, to)
 
 
 @kernel
@@ -108,9 +108,11 @@ def _list_places(tile, c, first, size):
 
     Returns how many there are.
     """
-    kind, places = tile.sorting.kind, tile.sorting.places
+    kind, row_class, places = tile.sorting.kind, tile.sorting.row_class, tile.sorting.places
     count = np.int64(0)
     for a in range(tile.height):
+        if row_class[a] != UNSORTED and row_class[a] != c:
+            continue
         for b in range(a * BROAD + first, a * BROAD + first + size):
             if kind[b] == c:
                 places[count] = b
@@ -194,7 +196,7 @@ def _price_by_few(tile, s, level, first, c):
 
 
 @kernel
-def _price_each(tile, s, first, size, c, to):
+def price_each(tile, s, first, size, c, to):
     """Price the members of a class one by one, in vectors. Those for which that does not do are UNSORTED then.
 
     tile, s, first, size: as of `price_part`.
@@ -248,11 +250,11 @@ def _price_each(tile, s, first, size, c, to):
 
 
 @kernel
-def _follow_others(tile, s, first, size, begun, to):
+def follow_others(tile, s, first, size, begun, to):
     """Follow those members that are in no class.
 
     tile, s, first, size, begun: as of `price_part`.
-    to: as of `_price_each`.
+    to: as of `price_each`.
 
     Returns how many these are.
     """

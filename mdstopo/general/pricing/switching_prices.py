@@ -203,7 +203,7 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
         if not found:
             mode = np.int64(law_start(code, p, node[ELONGATION, 0], node[RATE, 0], 0.0, time[0], curves, rest))
             if not law_margin(code, p, node[ELONGATION, 0], node[RATE, 0], mode, time[0], curves, rest) > CLOSE:
-                mode = _first_mode(model, candidates, k, at + i, s, node)
+                mode = first_mode(model, candidates, k, at + i, s, node)
             kept = law_first_set(code, p, node[ELONGATION, 0], mode)
         last = _follow(code, p, curves, rest, time, mode, kept, node, power, pieces)
         modes[1, i] = int(pieces[last, PIECE_MODE])
@@ -409,7 +409,7 @@ def add_in_mode(code, p, curves, t, value, weight, free, works, mode, price):
 
 
 @kernel
-def _first_mode(model, candidates, k, i, s, node):
+def first_mode(model, candidates, k, i, s, node):
     """The mode of member i at the first node of a step, where that depends on its second derivative.
 
     model: with the members.

@@ -31,11 +31,22 @@ from mdstopo.general.model.priced_candidates import (
     WHOLE,
 )
 from mdstopo.general.pricing.certain_modes import LEAVES, UNSURE, fill_spans, modes_at_nodes, modes_in_step
-from mdstopo.general.pricing.loaded_members import add_states, load_members, loaded_at
-from mdstopo.general.pricing.priced_tile import LEAST, LISTED_PARTS, LOADED, MOST, SAME, SETS, begin_pricing, load_tile
+from mdstopo.general.pricing.followed_by_few import follow_parts, goes_by_few
+from mdstopo.general.pricing.loaded_members import add_states, load_members
+from mdstopo.general.pricing.priced_tile import (
+    LEAST,
+    LISTED_PARTS,
+    LOADED,
+    MOST,
+    SAME,
+    SETS,
+    add_points,
+    begin_pricing,
+    load_tile,
+)
 from mdstopo.general.pricing.sorted_members import modes_of_all
 from mdstopo.general.pricing.sorted_prices import NO_LEVEL, price_part
-from mdstopo.general.pricing.switching_prices import ROW, add_pieces, price_point, price_step
+from mdstopo.general.pricing.switching_prices import ROW, add_pieces, price_step
 from mdstopo.mechanics.kinematics.kinematics_interface import member_works
 from mdstopo.mechanics.laws.law_table import law_is_idle, law_remembers
 from mdstopo.sensitivity.tile_interpolation import (
@@ -58,7 +69,7 @@ def price_run(model, candidates, k, place, scratch, lists, price):
     """Add what the members of a tile do by one law with modes.
 
     In:
-      model: with room for 2 PLACES members, which are overwritten.
+      model: with room for ROOM members, which are overwritten.
       candidates, k: a `PricedCandidates`, and the number of the run.
       place: the tile's grids, i, j and error, as of `tile_interpolation.take_prices`.
     In place:
@@ -80,7 +91,11 @@ def price_run(model, candidates, k, place, scratch, lists, price):
     # where members that remember are at a state alone: behind a part of a step, or behind the last step
     ends = np.int64(0)
     done = 0.0
+    if followed and goes_by_few(model, candidates, k):
+        done += follow_parts(tile, lists.left)
     for u in range(steps):
+        if not _is_to_do(lists.left, tile.width):
+            break
         if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, MOVES] == 0:
             continue
         if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
@@ -113,7 +128,7 @@ def _price_next(tile, u, begun, ends):
     followed = run[MODES] == FOLLOWED
     kind = candidates.step[run[FIRST_STEP] + u, KIND] if followed else np.int64(POINT)
     counts = not followed or candidates.step[run[FIRST_STEP] + u, MOVES] != 0
-    todo[:LOADED] = 1
+    todo[:PARTS] = lists.left
     changed = False
     done = 0.0
     level = np.int64(0)
@@ -121,7 +136,7 @@ def _price_next(tile, u, begun, ends):
         size = BROAD >> level
         for at in range(1 << level):
             smallest = at * (size // SHORT)
-            if (at + 1) * size > width or todo[smallest] == 0:
+            if (at + 1) * size > width or not _are_to_do(todo, smallest, size // SHORT):
                 continue
             part = (1 << level) - 1 + at
             mode = np.int64(-1)
@@ -153,6 +168,24 @@ def _price_next(tile, u, begun, ends):
     if changed:
         _share(lists.modes[0], lists.sets[0], tile.height, shared)
     return done
+
+
+@kernel
+def _is_to_do(left, width):
+    """Whether members of a tile of so many columns are gone through step by step; left (PARTS,): 1 for such parts."""
+    found = False
+    for smallest in range(PARTS):
+        found = found or (left[smallest] != 0 and smallest * SHORT < width)
+    return found
+
+
+@kernel
+def _are_to_do(todo, smallest, count):
+    """Whether as many of the smallest parts as `count` are to do, from one on; todo (PARTS or more,): 1 for each."""
+    found = True
+    for c in range(smallest, smallest + count):
+        found = found and todo[c] != 0
+    return found
 
 
 @kernel
@@ -264,8 +297,8 @@ def _follow_each(tile, u, begun, ends, smallest):
 
     Returns how many prices of steps were computed now, those of listed steps among them.
     """
-    model, candidates, k, price, lists = tile.model, tile.candidates, tile.k, tile.price, tile.lists
-    modes, sets, fresh, height = lists.modes, lists.sets, lists.fresh, tile.height
+    candidates, k, lists, height = tile.candidates, tile.k, tile.lists, tile.height
+    sets, fresh = lists.sets, lists.fresh
     run = candidates.run[k]
     load_tile(tile)
     first = smallest * SHORT
@@ -276,11 +309,7 @@ def _follow_each(tile, u, begun, ends, smallest):
         return 1.0 * height * wide
     kind = candidates.step[s, KIND]
     if kind == POINT:
-        for a in range(height):
-            for b in range(a * BROAD + first, a * BROAD + first + wide):
-                started = begun or ends != 0
-                member = loaded_at(b)
-                price[b] += price_point(model, candidates, k, member, s, modes[ends, b], sets[ends, b], started)
+        add_points(tile, s, first, wide, begun or ends != 0, ends)
         return 1.0 * height * wide
     no = np.bool_(False)
     followed = price_part(tile, s, np.int64(NO_LEVEL), first, wide, no, begun)
