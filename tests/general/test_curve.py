@@ -1,5 +1,7 @@
 """Curves in motion: steps end at their knots, so values and gradients keep the tolerance."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -50,3 +52,59 @@ def test_a_body_that_rests_on_a_knot_stays_there():
     assert found.status.ok
     assert found.objectives["X"] == 0.0
     assert found.work["steps"] < 10
+
+
+def hung(count, **solver):
+    """A plate that swings on `count` belts to two rows of points, whose curves have four knots each."""
+    rows = [[-1.0 + 0.37 * k, 1.0 + 0.13 * (k % 3)] for k in range(count // 2)]
+    scene = {
+        "format": 1,
+        "gravity": [0, -9.81],
+        "time": {"end": 0.4},
+        "bodies": {
+            "plate": {"mass": 12, "inertia": 1, "position": [0, 0], "velocity": [1, 0.4], "angular_velocity": 2}
+        },
+        "points": {
+            "corners": {"body": "plate", "grid": {"list": [[-0.2, 0.1], [0.3, 0.1]]}},
+            "hooks": {"body": "ground", "grid": {"list": rows}},
+        },
+        "members": {
+            "belts": {
+                "from": "corners", "to": "hooks",
+                "law": {"type": "curve", "curve": [[-0.15, -90], [-0.02, -20], [0.03, 40], [0.12, 260]]},
+            },
+        },
+        "design": {"initial": 0.4, "lower": 0},
+        "objectives": {
+            "X": {"response": {"displacement": {"body": "plate", "component": "x"}}, "over_time": "final"},
+            "A": {"response": {"acceleration": {"body": "plate", "at": [0.3, 0.1]}}, "over_time": "max"},
+        },
+        "combine": {"weights": {"X": 1, "A": 1}},
+        "solver": {"integrator": "runge_kutta", **solver},
+    }  # fmt: skip
+    return read_case(json.dumps(scene))
+
+
+@pytest.mark.parametrize(("count", "tolerance"), [(24, 1e-6), (60, 1e-8)])
+def test_gradients_of_many_curves_keep_the_tolerance(count, tolerance):
+    """Steps ended at the knots of twelve members at most: gradients of more were off by thousands of tolerances."""
+    alpha = np.random.default_rng(3).uniform(0.1, 0.6, count)
+    direction = np.random.default_rng(4).normal(size=count)
+    found = evaluate(hung(count, tolerance=tolerance), alpha)
+    for name, slope in slopes(hung(count, tolerance=1e-13), alpha, direction, 1e-4).items():
+        gradient = found.gradients[name]
+        assert abs(gradient @ direction - slope) < 30.0 * tolerance * np.abs(gradient).max(), name
+
+
+def test_steps_do_not_end_at_knots_of_members_that_carry_nothing():
+    alpha = np.zeros(60)
+    alpha[[0, 1, 30, 31]] = 0.5
+    found, alone = evaluate(hung(60), alpha, gradient=False), evaluate(hung(4), np.full(4, 0.5), gradient=False)
+    assert found.work["steps"] == alone.work["steps"]
+    assert found.objectives == pytest.approx(alone.objectives, rel=1e-13)
+
+
+def test_steps_pass_over_knots_of_very_many_members():
+    """At a smaller tolerance they are short anyway, so that it pays to end there."""
+    over, at = (evaluate(hung(60, tolerance=tolerance), gradient=False).work["steps"] for tolerance in (1e-6, 1e-8))
+    assert over < at / 2

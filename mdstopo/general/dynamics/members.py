@@ -43,9 +43,9 @@ SCALE, MODE, SET = range(3)
 
 #: share of the square of a free length that rounding may take from the square of a length at home
 SURE = 1e-12
-#: members of a group up to which steps end at the knots of their curves: a hundred would pass so many that steps
-#: would be cut to nothing
-KNOTTED = 12
+#: how many members with curves may carry load for steps to end at the knots of these: at tolerances down to COARSE, and
+#: by which power of the tolerance that rises below it
+KNOTTED, COARSE, RISE = 40, 1e-6, 0.25
 
 
 @kernel
@@ -187,13 +187,42 @@ def may_meet(shortest, motion):
 
 
 @kernel
-def set_modes(model, member_state, rel, rel_rate, knots):
+def most_knotted(tolerance):
+    """How many members with curves may carry load for steps to end at the knots of these.
+
+    Steps across knots leave the motion within the tolerance, but derivatives off by thousands of it, because stiffness
+    has kinks there. To end at each knot costs a step. The smaller the tolerance, the shorter are steps across knots, so
+    the more members it pays for.
+
+    tolerance: of the case, relative.
+    """
+    return np.int64(KNOTTED * max(COARSE / tolerance, 1.0) ** RISE)
+
+
+@kernel
+def curved_members(model, member_state):
+    """How many members with curves carry load, each law of a member counted."""
+    curved = 0
+    for k in range(model.block.shape[0]):
+        if model.block[k, CODE] == INERTER or not law_has_pieces(model.block[k, CODE]):
+            continue
+        lo = model.block[k, START]
+        for i in range(lo, lo + model.block[k, COUNT]):
+            curved += member_state[SCALE, i] != 0.0
+    return curved
+
+
+@kernel
+def set_modes(model, member_state, rel, rel_rate, most_curved):
     """Set the modes and permanent sets of members and contacts in member_state as they are at the start.
 
+    model: the compiled scene.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member; the scales are read.
     rel (n_pair, POSE): relative poses; rel_rate (n_pair, D): their second derivatives in time.
-    knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise, and in groups of more
-    than KNOTTED members, curves have no modes.
+    most_curved: up to so many members with curves that carry load, each piece of their curves is a mode, so that steps
+      end at its knots (`most_knotted`). Other curves have no modes.
     """
+    knots = curved_members(model, member_state) <= most_curved
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
         if code == INERTER:
@@ -204,8 +233,7 @@ def set_modes(model, member_state, rel, rel_rate, knots):
         for i in range(lo, lo + model.block[k, COUNT]):
             _, x, rate = member_motion(model, i, r)
             second = second_rate(model, i, r, acc)
-            whole = law_has_pieces(code) and (not knots or model.block[k, COUNT] > KNOTTED)
-            if whole:
+            if law_has_pieces(code) and not (knots and member_state[SCALE, i] != 0.0):
                 member_state[MODE, i] = 0.0
             else:
                 rest = model.member[MEMBER_FREE_LENGTH, i]

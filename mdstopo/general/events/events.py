@@ -59,7 +59,7 @@ FAR = 0.25
 
 @kernel
 def has_switches(model, knots):
-    """Whether any member can change its mode; knots: as of `members.set_modes`."""
+    """Whether any member can change its mode; knots: whether pieces of curves count as modes."""
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
         if code != INERTER and law_switches(code, model.law[k], model.curves) and (knots or not law_has_pieces(code)):

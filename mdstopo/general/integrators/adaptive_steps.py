@@ -11,7 +11,15 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.dynamics.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
+from mdstopo.general.dynamics.members import (
+    MODE,
+    SET,
+    may_meet,
+    meeting,
+    most_knotted,
+    scale_general,
+    shortest_at_start,
+)
 from mdstopo.general.dynamics.projection import project
 from mdstopo.general.dynamics.singular_poses import (
     CLOSE,
@@ -293,7 +301,8 @@ def run_adaptive(
         moving[d] = model.mass[d] if model.free[d] != 0 else 0.0
     measures = explicit and method == 1 and not fixed_step > 0.0
     if switching:
-        singular = modes_at_start(model, member_state, workspace, q0, v0, a0, lam, np.bool_(True))
+        most_curved = most_knotted(settings[0])
+        singular = modes_at_start(model, member_state, workspace, q0, v0, a0, lam, most_curved)
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t

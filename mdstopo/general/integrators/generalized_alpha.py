@@ -121,7 +121,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     watched = room_for_watched(model)
     watch_all(model, np.int64(0), watched)
     if switching:
-        singular = modes_at_start(model, member_state, workspace, q, v, a0, lam, no)
+        singular = modes_at_start(model, member_state, workspace, q, v, a0, lam, np.int64(0))
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t

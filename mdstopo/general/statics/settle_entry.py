@@ -44,7 +44,7 @@ def rest(model, alpha, member_state, q, v):
     n_pair = model.pair.shape[0]
     rel = np.empty((n_pair, pose_size(model)))
     relative_pose(model, q, v, rel)
-    set_modes(model, member_state, rel, np.zeros((n_pair, freedoms(model))), np.bool_(True))
+    set_modes(model, member_state, rel, np.zeros((n_pair, freedoms(model))), np.int64(0))
 
 
 @entry

@@ -63,7 +63,7 @@ def linearise(ints, floats, alpha, member_state, stiffness, mass, rows):
     a = np.zeros(n)
     lam = np.zeros(model.size[0])
     scale_general(model.block, model.power, alpha, member_state)
-    modes_at_start(model, member_state, workspace, q, v, a, lam, np.bool_(True))
+    modes_at_start(model, member_state, workspace, q, v, a, lam, np.int64(0))
     solve_accelerations(model, member_state, np.int64(0), model.times[0], q, v, np.bool_(True), workspace, a, lam)
     for d in range(n):
         mass[d, d] = model.mass[d]
