@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.model import GROUND
 from mdstopo.plots.beside import FREE, lanes, sideways
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.member_lines import MOST, NARROWEST, widest_of
@@ -192,5 +193,6 @@ def _body_lines(stage: Stage, name: str) -> list[tuple[Floats, bool, float]]:
     for shape2 in planar_shapes(stage.case, name):
         found += [(np.concatenate([area, area[:1]]), True, 1.0) for area in shape2.areas]
         found += [(line, False, 2.0) for line in shape2.lines]
-        found += [(arm, False, 1.0 if shape2.lines else 2.6) for arm in shape2.arms]
+        thin = shape2.lines or (name != GROUND and stage.case.body(name).outline)
+        found += [(arm, False, 1.0 if thin else 2.6) for arm in shape2.arms]
     return found

@@ -38,7 +38,7 @@ def draw(
     count = 1 if overlay else len(panels)
     inches = _panel(stage, count)
     names = legend_names(case, load_case)
-    above = height_of(len(names), columns_of(names, WIDTH, COLUMNS))
+    above = height_of(len(names), columns_of(names, WIDTH, COLUMNS), legend_title(case, thick))
     high = float(inches[1]) + BELOW + ABOVE
     figure = module.Figure(figsize=(WIDTH, above + count * high))
     x = 0.5 * (WIDTH - float(inches[0]) + (LEFT - RIGHT if case.dimension == 2 else 0.0))

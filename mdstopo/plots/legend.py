@@ -14,8 +14,9 @@ from mdstopo.plots.thickness import families
 
 #: how legends are set, in letters: the lines beside names, between these and the names, between columns
 SETTING = {"handlelength": 1.7, "handletextpad": 0.6, "columnspacing": 1.0, "alignment": "left", "borderaxespad": 0.3}
-#: inches: a name has so much beside its letters, and so much for each; a line, and the title
-BESIDE, LETTER, LINE, HEAD = 0.33, 0.058, 0.15, 0.22
+#: inches: a name has so much beside its letters, and so much for each; a line; above the
+#: lines with a title, and without
+BESIDE, LETTER, LINE, HEAD, EDGE = 0.33, 0.058, 0.15, 0.22, 0.08
 
 
 def legend_names(case: Case, load_case: str | None = None) -> list[str]:
@@ -36,9 +37,9 @@ def columns_of(names: Sequence[str], width: float, most: int) -> int:
     return 1
 
 
-def height_of(count: int, columns: int) -> float:
-    """Inches that a legend of so many names in so many columns takes, with its title."""
-    return HEAD + LINE * -(-count // columns)
+def height_of(count: int, columns: int, title: str | None) -> float:
+    """Inches that a legend of so many names in so many columns takes, with its title where it has one."""
+    return (HEAD if title else EDGE) + LINE * -(-count // columns)
 
 
 def legend_handles(axis: Any) -> tuple[list[Any], list[str]]:

@@ -55,7 +55,9 @@ def draw_space(
     }
     names = legend_names(case, load_case)
     columns = columns_of(names, PAGE - 0.1, COLUMNS)
-    (places, inches), box, scale = _adapted(seen, (low, high), marks, len(panels), height_of(len(names), columns))
+    (places, inches), box, scale = _adapted(
+        seen, (low, high), marks, len(panels), height_of(len(names), columns, legend_title(case, thick))
+    )
     figure = module.Figure(figsize=inches)
     figure.set_layout_engine("none")  # the panels' places give all views one scale
     for k, (t, q) in enumerate(panels):

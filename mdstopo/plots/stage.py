@@ -7,8 +7,8 @@ import numpy as np
 
 from mdstopo.case.model import GROUND
 from mdstopo.plots.cloud import planar_cloud, scene_cloud
+from mdstopo.plots.drawn_plane import draw_bodies, draw_state, marks_of
 from mdstopo.plots.member_lines import draw_members
-from mdstopo.plots.planar_scene import draw_bodies, draw_state, marks_of
 from mdstopo.plots.scenery import Floats
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
