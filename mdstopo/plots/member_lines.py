@@ -13,11 +13,11 @@ from mdstopo.plots.style import MOST_NAMED, colour, ink
 from mdstopo.plots.thickness import Thickness, families, strongest
 
 #: points: the widest member where there are few, where there are many, and the narrowest
-WIDEST, CROWDED, NARROWEST = 2.4, 0.5, 0.35
+WIDEST, CROWDED, NARROWEST = 2.4, 0.4, 0.35
 #: of a slack member: its dashes, and how wide it is, as a share of a taut one
 HANGING, THIN = (0, (3.0, 2.0)), 0.5
 #: members that are few, and that are many; those that are drawn, the strongest first
-FEW, MANY, MOST = 40, 4000, 20_000
+FEW, MANY, MOST = 40, 1000, 20_000
 
 
 def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], Floats], thick: Thickness) -> None:

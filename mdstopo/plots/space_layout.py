@@ -12,7 +12,7 @@ from mdstopo.plots.member_lines import draw_members, legend_title
 from mdstopo.plots.scenery import Floats, hull
 from mdstopo.plots.solids import Solid, solid
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import WIDTH, colour, ink
+from mdstopo.plots.style import WIDTH, colour, ink, is_dark
 from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.symbol_marks import Mark, draw_marks, marks_at
 from mdstopo.plots.symbols import symbols
@@ -32,7 +32,8 @@ LEAST = 0.4
 ROUNDS = 4
 #: inches: the axes' directions in the corner of the perspective
 ARROW = 0.17
-_AXES = ("#B22222", "#2E7D32", "#1F4FA3")
+#: colours of the axes x, y, z on a light and on a dark ground
+_AXES, _AXES_ON_DARK = ("#B22222", "#2E7D32", "#1F4FA3"), ("#FF7A7A", "#6CC070", "#7FB0FF")
 
 
 def draw_space(
@@ -242,7 +243,7 @@ def draw_perspective(axis: Any, view: View, box: tuple[Floats, Floats], inches: 
     for spine in axis.spines.values():
         spine.set_visible(False)
     foot = middle + np.array([-0.42, -0.42]) * wide
-    for k, own in enumerate(_AXES):
+    for k, own in enumerate(_AXES_ON_DARK if is_dark() else _AXES):
         way = ARROW * wide[0] / inches[0] * np.array([view.across[k], view.along[k]])
         axis.plot(*np.array([foot, foot + way]).T, "-", color=own, linewidth=1.2, clip_on=False)
         axis.text(*(foot + 1.35 * way), "xyz"[k], color=own, ha="center", va="center", fontsize=8)

@@ -23,6 +23,8 @@ from mdstopo.scene.point_positions import points_at
 
 #: at most so many states are looked at for room for their symbols
 STATES = 40
+#: inches that the number of a tick needs below a drawing and beside it; ticks at most
+ACROSS, UP, MOST_TICKS = 0.42, 0.16, 8
 
 
 class Stage:
@@ -95,6 +97,10 @@ class Stage:
         free = 72.0 * float(inches[1]) / scale - (high - low)[1]  # of a flat scene, above and below
         axis.set_xlim(low[0], high[0])
         axis.set_ylim(low[1] - 0.5 * free, high[1] + 0.5 * free)
+        for name, length, needed in (("x", float(inches[0]), ACROSS), ("y", float(inches[1]), UP)):
+            axis.locator_params(axis=name, nbins=max(1, min(MOST_TICKS, int(length / needed))))
+        for each in (axis.xaxis, axis.yaxis):
+            each.set_major_formatter(lambda number, _: f"{number:g}".replace("-", "\u2212"))
         axis.set_xlabel("x, m")
         axis.set_ylabel("y, m")
         loaded = self.case.load_cases[0] if shown[0] is None else self.case.load_case(shown[0])
