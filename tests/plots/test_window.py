@@ -162,3 +162,34 @@ def test_names_in_a_legend_are_whole() -> None:
     assert box.x1 <= whole.x1
     assert box.y1 <= whole.y1
     assert box.y0 >= axis.get_window_extent().y1
+
+
+def test_a_moving_svg_dashes_belts_while_they_are_slack_and_shows_what_is_touched() -> None:
+    from mdstopo.plots.animation import _svg
+    from mdstopo.plots.stage import Stage
+    from mdstopo.plots.thickness import Thickness
+
+    text = EDGES.replace("  alone:", "  slack:").replace(
+        "[4, 0.2]}, law: {type: spring, stiffness: 5}", "[4, 0.2]}, law: LAW"
+    )
+    text = text.replace("LAW", "{type: gap, stiffness: 5, gap: 0.1}")
+    text += """points: {foot: {body: b, grid: {list: [[4, 0]]}}}
+contacts: [{points: foot, on: {body: ground, from: [-1, -0.4], to: [5, -0.4]}, stiffness: 1e4}]
+"""
+    source = source_of(text)
+    source.title = "belts"
+    states = np.tile(start_state(source.case), (3, 1))
+    states[1:, 3] += 0.5  # pulled taut
+    shares = Thickness(tuple(np.ones(len(group)) for group in source.case.members), "")
+    said = _svg(Stage(source, states), shares, np.linspace(0.0, 1.0, 3), states, 4.0)
+    assert said.count('attributeName="stroke-dasharray"') == 1
+    assert 'calcMode="discrete" values="4 3;none;none"' in said
+    assert "4 times slower" in said
+    assert said.count("<polyline") == 3 + len(bodies_lines(source)) + 1
+
+
+def bodies_lines(source: Any) -> list[Any]:
+    from mdstopo.plots.body_shapes import planar_shapes
+
+    shapes = [shape for name in ("a", "b", "ground") for shape in planar_shapes(source.case, name)]
+    return [line for shape in shapes for line in (*shape.areas, *shape.lines, *shape.arms)]
