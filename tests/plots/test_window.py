@@ -193,3 +193,27 @@ def bodies_lines(source: Any) -> list[Any]:
 
     shapes = [shape for name in ("a", "b", "ground") for shape in planar_shapes(source.case, name)]
     return [line for shape in shapes for line in (*shape.areas, *shape.lines, *shape.arms)]
+
+
+def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that() -> None:
+    from mdstopo.plots.designs_plot import FIRST, SECOND, draw_pair
+    from mdstopo.plots.style import styled
+
+    text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
+    first, second = source_of(text), source_of(text)
+    names = list(first.case.group_slices)
+    first.alpha = np.array([{"belts": 1.0, "chains": 0.0, "alone": 1.0}[name] for name in names])
+    second.alpha = np.array([{"belts": 0.0, "chains": 1.0, "alone": 1.0}[name] for name in names])
+    with styled() as module:
+        figure = draw_pair(module, first, second, ("first", "second"))
+    found = []
+    for axis, own in ((figure.axes[2], FIRST), (figure.axes[3], SECOND)):
+        wanted = matplotlib.colors.to_rgba(own)
+        found.append(
+            sum(
+                len(each.get_segments())
+                for each in axis.collections
+                if len(each.get_colors()) and tuple(each.get_colors()[0]) == wanted
+            )
+        )
+    assert found == [1, 1]
