@@ -179,10 +179,10 @@ def _outline(axis: Any, view: View, corners: Floats, shape: Solid, own: str) -> 
     elif len(shape.faces):
         _faces(axis, view, flat, shape, own)
     front = _in_front(view, corners, shape)
-    width = 0.8 if shape.faces else 1.6
+    width, full = (0.8, 1.0) if shape.faces else (1.1, 0.6)  # lines alone are fainter than members
     near = [flat[list(edge)] for edge in shape.edges if (min(edge), max(edge)) in front or not shape.faces]
     far = [flat[list(edge)] for edge in shape.edges if (min(edge), max(edge)) not in front and shape.faces]
-    for lines, alpha, order in ((near, 1.0, 2.1), (far, 0.3, 1.5)):
+    for lines, alpha, order in ((near, full, 2.1), (far, 0.3, 1.5)):
         axis.add_collection(
             LineCollection(lines, colors=own, linewidths=width, alpha=alpha, zorder=order), autolim=False
         )

@@ -132,7 +132,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
         const alpha = body.faces.length < 2 ? 0.15 : area < 0 ? 0.24 : 0.1; // those that look to the eye are stronger
         things.push([mean(points), () => polygon(points, own, alpha)]);
       }
-      for (const [m, n] of body.edges) things.push([(corners[m][2] + corners[n][2]) / 2, () => line(corners[m], corners[n], own, body.faces.length ? 1.2 : 2.4, 0.9)]);
+      for (const [m, n] of body.edges) things.push([(corners[m][2] + corners[n][2]) / 2, () => line(corners[m], corners[n], own, body.faces.length ? 1.2 : 1.5, body.faces.length ? 0.9 : 0.6)]);
       for (const p of body.points) { const s = seen(place(seat, p)); things.push([s[2], () => { g.globalAlpha = 1; g.fillStyle = own; g.fillRect(s[0] - 1.5, s[1] - 1.5, 3, 3); }]); }
       if (!fixed) names.push([body.name, seen(seat[3]), own]);
     });
