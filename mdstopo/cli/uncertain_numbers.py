@@ -51,13 +51,21 @@ def say_result(output: Output, view: "ResultView") -> None:
     """Print what a result file holds of an uncertain case."""
     if "uncertainty/robust" not in view.arrays:
         return
+    from mdstopo.case.text.errors import CaseError
+    from mdstopo.robust.conclusion import told
+    from mdstopo.store.stored_case import case_of
+
+    try:
+        case = case_of(view)
+    except CaseError:  # a file that it needs is gone
+        case = None
     part, check = view.under("uncertainty"), view.under("uncertainty/validation")
     count = len(view.array("uncertainty/probability"))
     output.say(f"uncertain: {count} points of the sample, {len(check.get('objectives', ()))} of a fresh one")
     rows = [["", "measure", "value", "nominal", "fresh sample", "from", "to", "worse there"]]
     named = zip(view.lines("uncertainty/results"), view.lines("uncertainty/measures"), strict=True)
     for i, (name, measure) in enumerate(named):
-        cells = [name, measure, number(part["robust"][i], 9), number(part["nominal"][i], 9)]
+        cells = [told(case, name), measure, number(part["robust"][i], 9), number(part["nominal"][i], 9)]
         if check:
             values: Sequence[float] = [check["measured"][i], *check["interval"][i], check["worse"][i]]
             cells += [number(value) for value in values]

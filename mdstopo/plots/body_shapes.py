@@ -42,9 +42,11 @@ class Shape:
 
 def planar_shapes(case: Case, body: str) -> list[Shape]:
     """What is drawn of a body in the plane: each of its outlines, or one shape from its points."""
-    if body != GROUND and case.body(body).outline:
-        return [Shape([each.corners[list(face)] for face in each.faces]) for each in case.body(body).outline]
     points = own_points(case, body)
+    if body != GROUND and case.body(body).outline:
+        found = [Shape([each.corners[list(face)] for face in each.faces]) for each in case.body(body).outline]
+        arms = _reaching(points, [area for shape in found for area in shape.areas])
+        return [*found, Shape(arms=arms)] if 0 < len(arms) <= MOST_ARMS else found
     if body != GROUND and len(points):
         area = hull(points)
         if len(area) > 2 and not others_within(case, body, area):
@@ -55,6 +57,35 @@ def planar_shapes(case: Case, body: str) -> list[Shape]:
     if body == GROUND:
         return [Shape(lines=[line for grid in grids for line in followed(grid)])]
     return [line_shape(points, grids)]
+
+
+def _reaching(points: Floats, areas: list[Floats]) -> list[Floats]:
+    """Arms (2, 2) from closed lines (n, 2) to the points that lie outside of all of them: a bushing beside a block."""
+    size = BORDER * float(np.ptp(np.concatenate(areas), axis=0).max())
+    arms = []
+    for point in np.unique(points, axis=0):
+        nearest = [_nearest(point, area) for area in areas]
+        gap = min(nearest, key=lambda place: float(np.linalg.norm(place - point)))
+        if np.linalg.norm(gap - point) > size and not any(_is_within(point, area) for area in areas):
+            arms.append(np.array([gap, point]))
+    return arms
+
+
+def _nearest(point: Floats, area: Floats) -> Floats:
+    """The place (2,) on a closed line (n, 2) that is nearest to a point."""
+    way = np.roll(area, -1, axis=0) - area
+    share = ((point - area) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-300)
+    places = area + np.clip(share, 0.0, 1.0)[:, None] * way
+    return np.asarray(places[int(((places - point) ** 2).sum(axis=1).argmin())])
+
+
+def _is_within(point: Floats, area: Floats) -> bool:
+    """Whether a point is inside a closed line (n, 2): a ray from it meets the line an odd number of times."""
+    following = np.roll(area, -1, axis=0)
+    crosses = (area[:, 1] > point[1]) != (following[:, 1] > point[1])
+    a, b = area[crosses], following[crosses]
+    x = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool((x > point[0]).sum() % 2)
 
 
 def line_shape(points: Floats, grids: list[Floats]) -> Shape:

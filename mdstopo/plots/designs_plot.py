@@ -1,93 +1,104 @@
 """Two designs side by side: start and final of a result, or those of two results with what differs."""
 
+import re
 from typing import Any
 
 import numpy as np
 
-from mdstopo.plots.member_lines import NARROWEST, widest_of
+from mdstopo.plots.beside import lanes
+from mdstopo.plots.member_lines import NARROWEST, add_lines, widest_of
+from mdstopo.plots.panels import ABOVE, BELOW, LEFT, RIGHT, add_panel, fitted
 from mdstopo.plots.scenery import start_state
+from mdstopo.plots.slack import member_lines
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.stage import Stage
 from mdstopo.plots.style import WIDTH, ink
-from mdstopo.plots.thickness import FAINT, thickness
+from mdstopo.plots.thickness import FAINT, Thickness, thickness
 
 #: of the largest: a difference that is drawn
 LEAST = 0.05
 FIRST, SECOND = "#D55E00", "#0072B2"
+#: inches: how high a drawing is at most
+HIGHEST = 2.5
 
 
 def draw(module: Any, source: Source) -> Any:
     """The design that the optimiser began with, and that of the file, at the start of the motion."""
     case, q = source.stated, start_state(source.case)
-    figure = module.Figure(figsize=(2.0 * WIDTH, 3.1))
     # points that are design variables began elsewhere; both pictures have one scale
     pair = (source.as_stated(), source)
     stages = [Stage(each, q[None]) for each in pair]
-    window = np.concatenate([stage.cloud for stage in stages])
-    axes, designs = figure.subplots(1, 2), (np.asarray(case.initial), source.alpha)
+    stages[0].cloud = stages[1].cloud = np.concatenate([stage.cloud for stage in stages])
+    figure, ((left, right),), inches = _panels(module, stages, 1)
+    axes, designs = (left, right), (np.asarray(case.initial), source.alpha)
     for axis, shown, stage, design, title in zip(axes, pair, stages, designs, ("start", "design"), strict=True):
-        stage.cloud = window
         thick = thickness(shown, design)
-        stage.draw(axis, q, thick, (None, None))
+        stage.draw(axis, q, thick, (None, None), inches)
         axis.set_title(f"{title}; width: {thick.what}" if thick.what else title, loc="left")
     return figure
 
 
 def draw_pair(module: Any, first: Source, second: Source, titles: tuple[str, str]) -> Any:
     """Both designs, and below them the members of which there is more in the one or in the other."""
-    figure = module.Figure(figsize=(2.0 * WIDTH, 6.2))
-    axes = figure.subplots(2, 2)
-    for axis, source, title in zip(axes[0], (first, second), titles, strict=True):
-        q = start_state(source.case)
-        Stage(source, q[None]).draw(axis, q, thickness(source), (None, None))
+    stages = [Stage(source, start_state(source.case)[None]) for source in (first, second)]
+    figure, axes, inches = _panels(module, stages, 2)
+    for axis, stage, title in zip(axes[0], stages, titles, strict=True):
+        stage.draw(axis, start_state(stage.case), thickness(stage.source), (None, None), inches)
         axis.set_title(title, loc="left")
-    for axis, source, other, colour, title in (
-        (axes[1, 0], first, second, FIRST, "more in the first"),
-        (axes[1, 1], second, first, SECOND, "more in the second"),
+    for axis, stage, other, colour, title in (
+        (axes[1][0], stages[0], second, FIRST, "more in the first"),
+        (axes[1][1], stages[1], first, SECOND, "more in the second"),
     ):
-        _more(axis, source, other, colour)
+        _more(axis, stage, other, colour, inches)
         axis.set_title(title, loc="left")
     return figure
 
 
-def _more(axis: Any, source: Source, other: Source, colour: str) -> None:
+def _panels(module: Any, stages: list[Stage], rows: int) -> tuple[Any, list[list[Any]], Floats]:
+    """A figure, rows of two drawings as high as what is seen needs, and their size in inches (2,)."""
+    most = np.array([WIDTH - LEFT - RIGHT, HIGHEST])
+    inches = np.max([fitted(stage.window(most), most) for stage in stages], axis=0)
+    high = float(inches[1]) + BELOW + ABOVE
+    figure = module.Figure(figsize=(2.0 * WIDTH, rows * high))
+    places = [[(k * WIDTH + LEFT, (rows - 1 - row) * high + BELOW) for k in range(2)] for row in range(rows)]
+    return figure, [[add_panel(figure, x, y, inches) for x, y in row] for row in places], inches
+
+
+def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -> None:
     """What members of a result have more of than those of another; all others are thin."""
-    from matplotlib.collections import LineCollection
-
-    q = start_state(source.case)
-    stage = Stage(source, q[None])
-    shares = thickness(source).shares
-    blank = type(thickness(source))(tuple(np.zeros_like(share) for share in shares), "")
-    stage.draw(axis, q, blank, (None, None), faint=0.5)
+    source, case, q = stage.source, stage.case, start_state(stage.case)
+    thick = thickness(source)
+    blank = Thickness(tuple(np.zeros_like(share) for share in thick.shares), "")
+    stage.draw(axis, q, blank, (None, None), inches, faint=0.5)
+    named = {_plain(group.name) for group in case.members} & {_plain(group.name) for group in other.case.members}
     known: dict[tuple[Any, ...], float] = {}
-    for key, share in _by_ends(other):  # of members beside each other the thickest
+    for key, share in _by_ends(other, named):
         known[key] = max(share, known.get(key, 0.0))
-    lines, widths = [], []
-    for (key, share), end in zip(_by_ends(source), _all_ends(source, stage, q), strict=True):
-        more = share - known.get(key, 0.0)
-        if more > LEAST:
-            lines.append(end)
-            widths.append(more)
-        elif share > FAINT:
-            axis.plot(*end.T, "-", color=ink("faint"), linewidth=NARROWEST, zorder=2.0)
-    widest = widest_of(len(lines))
-    axis.add_collection(
-        LineCollection(lines, colors=colour, linewidths=NARROWEST + widest * np.array(widths), zorder=2.4),
-        autolim=False,
-    )
+    every = np.array([share - known.get(key, 0.0) for key, share in _by_ends(source, named)])
+    more = np.split(every, np.cumsum([len(group) for group in case.members])[:-1])
+    drawn = [np.flatnonzero((rise > LEAST) | (share > FAINT)) for rise, share in zip(more, thick.shares, strict=True)]
+    widest = widest_of(int((every > LEAST).sum()))
+    for group, some, lane, rise in zip(case.members, drawn, lanes(case, drawn), more, strict=True):
+        lines, _ = member_lines(case, group, q, stage.seen, some)
+        is_more = rise[some] > LEAST
+        add_lines(axis, lines[~is_more], lane[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
+        widths = NARROWEST + widest * rise[some][is_more]
+        add_lines(axis, lines[is_more], lane[is_more], widest, colors=colour, linewidths=widths, zorder=2.4)
 
 
-def _by_ends(source: Source) -> list[tuple[tuple[Any, ...], float]]:
+def _plain(name: str) -> str:
+    """The name of a group, without the number that one of a final design has, whose groups are single members."""
+    return re.sub(r"_\d+$", "", name)
+
+
+def _by_ends(source: Source, named: set[str]) -> list[tuple[tuple[Any, ...], float]]:
+    """Members by bodies, ends and group, where both results have groups of that name, with their thickness."""
     found = []
     for group, share in zip(source.case.members, thickness(source).shares, strict=True):
         ends = np.concatenate([group.from_world[group.from_index], group.to_world[group.to_index]], axis=1)
+        name = _plain(group.name) if _plain(group.name) in named else ""
         found += [
-            ((group.body_from, group.body_to, *np.round(end, 9).tolist()), float(s))
+            ((name, group.body_from, group.body_to, *np.round(end, 9).tolist()), float(s))
             for end, s in zip(ends, share, strict=True)
         ]
     return found
-
-
-def _all_ends(source: Source, stage: Stage, q: Floats) -> list[Floats]:
-    ends = stage.ends(q)
-    return [end for group in source.case.members for end in ends(group)]

@@ -47,7 +47,10 @@ _BLOCK_ARROW = _line((0, 1.5), (15, 1.5), (15, 4.5), (23, 0), (15, -4.5), (15, -
 _ZIGZAG = _line((-7, 0), (-5, 0), (-4, 3), (-2, -3), (0, 3), (2, -3), (4, 3), (5, 0), (7, 0))
 
 
-_BETWEEN_STOPS = (_line((-9, 0), (9, 0)), _line((-9, -4), (-9, 4)), _line((9, -4), (9, 4)))
+#: with room between for the symbols of a rotation, a joint or a load at the same place
+_STOPS = (
+    _line((-13, -4), (-13, 4)), _line((-13, 0), (-10, 0)), _line((13, -4), (13, 4)), _line((13, 0), (10, 0))
+)  # fmt: skip
 _DIAGONALS = (_line((-3.4, -3.4), (3.4, 3.4)), _line((-3.4, 3.4), (3.4, -3.4)))
 
 
@@ -70,10 +73,8 @@ def glyphs() -> dict[str, Glyph]:
         "moment": Glyph((arc, head), "ink", "moment"),
         "motion": Glyph((_BLOCK_ARROW,), "paper", "prescribed motion"),
         "turning": Glyph((driven, _circle(1.2), driven_head), "paper", "prescribed rotation"),
-        "held": Glyph(_BETWEEN_STOPS, "", "held coordinate"),
+        "held": Glyph(_STOPS, "", "held coordinate"),
         "unturned": Glyph((_box(3.4, 3.4), *_DIAGONALS), "paper", "held rotation"),
         "gravity": Glyph((_line((0, 0), (14, 0)), _line((18, 0), (13, 2.2), (13, -2.2), (18, 0))), "ink", "gravity"),
         "ground": Glyph((_line((-5, 0), (6, 0)), *_HATCH), "", "ground"),
-        "ground below": Glyph(tuple(line - np.array([0.0, 4.0]) for line in (_line((-5, 0), (6, 0)), *_HATCH)), "",
-                              "ground"),
     }  # fmt: skip

@@ -6,17 +6,18 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case
+from mdstopo.plots.beside import FREE, lanes, sideways
 from mdstopo.plots.slack import member_lines
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import MOST_NAMED, colour, ink
 from mdstopo.plots.thickness import Thickness, families, strongest
 
 #: points: the widest member where there are few, where there are many, and the narrowest
-WIDEST, CROWDED, NARROWEST = 2.4, 0.5, 0.35
+WIDEST, CROWDED, NARROWEST = 2.4, 0.4, 0.35
 #: of a slack member: its dashes, and how wide it is, as a share of a taut one
 HANGING, THIN = (0, (3.0, 2.0)), 0.5
 #: members that are few, and that are many; those that are drawn, the strongest first
-FEW, MANY, MOST = 40, 4000, 20_000
+FEW, MANY, MOST = 40, 1000, 20_000
 
 
 def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], Floats], thick: Thickness) -> None:
@@ -28,16 +29,16 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
     seen: places (n, d) on the paper (n, 2).
     thick: how thick members are.
     """
-    from matplotlib.collections import LineCollection
-
     case = source.case
     chosen = strongest(thick.shares, MOST)
     widest = widest_of(sum(len(each) for each in chosen))
     named = families(case)
     order = list(dict.fromkeys(named))
     any_slack = False
-    for group, share, some, family in zip(case.members, thick.shares, chosen, named, strict=True):
-        some = some[np.argsort(share[some])]
+    every = zip(case.members, thick.shares, chosen, lanes(case, chosen), named, strict=True)
+    for group, share, some, lane, family in every:
+        rising = np.argsort(share[some])
+        some, lane = some[rising], lane[rising]
         lines, slack = member_lines(case, group, q, seen, some)
         widths = NARROWEST + (widest - NARROWEST) * share[some]
         for hangs, style, factor in ((False, "-", 1.0), (True, HANGING, THIN)):
@@ -45,12 +46,9 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
             if hangs and not own.any():
                 continue
             corners = slice(None) if hangs else slice(None, None, lines.shape[1] - 1)
-            axis.add_collection(
-                LineCollection(
-                    list(lines[own][:, corners]), colors=colour(order.index(family)), linewidths=factor * widths[own],
-                    alpha=0.85, linestyles=[style], zorder=2.2,
-                ),
-                autolim=True,
+            add_lines(
+                axis, lines[own][:, corners], lane[own], widest, colors=colour(order.index(family)),
+                linewidths=factor * widths[own], alpha=0.85, linestyles=[style], zorder=2.2,
             )  # fmt: skip
         any_slack |= bool(slack.any())
     chosen_from = {each for group, each in zip(case.members, named, strict=True) if group.design}
@@ -59,6 +57,29 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
         axis.plot([], [], "-", color=colour(order.index(family)), label=label)
     if any_slack:
         axis.plot([], [], color=ink("middle"), linewidth=0.8, linestyle=HANGING, label="slack")
+
+
+def add_lines(axis: Any, lines: Floats, lane: Floats, widest: float, **style: Any) -> None:
+    """Lines of members on the paper.
+
+    axis: where they are drawn.
+    lines (K, n, 2): their corners.
+    lane (K,): of `lanes`.
+    widest: points, the width of the widest.
+    style: settings of the lines.
+    """
+    from matplotlib.collections import LineCollection
+    from matplotlib.transforms import Affine2D
+
+    if np.any(lane):
+        shifts = (widest + FREE) * sideways(lines, lane) * _ahead(axis)
+        style |= {"offsets": shifts, "offset_transform": Affine2D().scale(1.0 / 72.0) + axis.figure.dpi_scale_trans}
+    axis.add_collection(LineCollection(list(lines), **style), autolim=False)
+
+
+def _ahead(axis: Any) -> Floats:
+    """(2,) -1 where an axis of a picture runs backwards."""
+    return np.array([-1.0 if axis.xaxis_inverted() else 1.0, -1.0 if axis.yaxis_inverted() else 1.0])
 
 
 def legend_title(case: Case, thick: Thickness) -> str | None:

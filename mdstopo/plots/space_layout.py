@@ -1,35 +1,39 @@
 """The system in space: front, top, side, all to one scale, and perspective."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import GROUND, Case
-from mdstopo.plots.glyphs import glyphs
+from mdstopo.case.model import GROUND
+from mdstopo.plots.cloud import scene_cloud
+from mdstopo.plots.legend import SETTING, columns_of, height_of, legend_handles, legend_names
 from mdstopo.plots.member_lines import draw_members, legend_title
-from mdstopo.plots.scenery import Floats, ends_at, hull, points_of
+from mdstopo.plots.scenery import Floats, hull
 from mdstopo.plots.solids import Solid, solid
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import MOST_NAMED, WIDTH, colour, ink
+from mdstopo.plots.style import WIDTH, colour, ink, is_dark
 from mdstopo.plots.surface_lines import surfaces_of
-from mdstopo.plots.symbol_marks import draw_symbols, legend_handles
+from mdstopo.plots.symbol_marks import Mark, draw_marks, marks_at
 from mdstopo.plots.symbols import symbols
-from mdstopo.plots.thickness import Thickness, families
+from mdstopo.plots.thickness import Thickness
 from mdstopo.plots.views import View, views
+from mdstopo.plots.window import AROUND, FREE, places_and_reaches, window
 from mdstopo.scene.point_positions import points_at
 
-#: inches: a page's width, its greatest height; left of a panel, below it, above it; a line of the legend, its title
+#: inches: a page's width, its greatest height; left of a panel, below it, above it
 PAGE, TALL = 2.0 * WIDTH, 9.0
-LEFT, BELOW, ABOVE, LINE, HEAD = 0.55, 0.42, 0.22, 0.14, 0.22
-#: inches: a name in the legend has so much beside its letters, and so much for each
-BESIDE, LETTER = 0.55, 0.062
-#: share of the scene's size that is left free around it; the least of a panel's sides, in the longest one's
-MARGIN, LEAST = 0.07, 0.55
+LEFT, BELOW, ABOVE = 0.55, 0.42, 0.22
+#: columns of a legend, at most
+COLUMNS = 6
+#: the least of a panel's sides, in the longest one's
+LEAST = 0.4
+#: times that the panels are adapted to the scale they have
+ROUNDS = 4
 #: inches: the axes' directions in the corner of the perspective
 ARROW = 0.17
-#: how many times larger than the design a scene may be before what is far off is left out of the view
-FAR = 2.0
-_AXES = ("#B22222", "#2E7D32", "#1F4FA3")
+#: colours of the axes x, y, z on a light and on a dark ground
+_AXES, _AXES_ON_DARK = ("#B22222", "#2E7D32", "#1F4FA3"), ("#FF7A7A", "#6CC070", "#7FB0FF")
 
 
 def draw_space(
@@ -42,44 +46,78 @@ def draw_space(
     """The four views of each state; one below the other where there are several times, each in a row."""
     case = source.case
     solids = {name: solid(case, name) for name in [*(body.name for body in case.bodies), GROUND]}
-    cloud = scene_cloud(case, [q for _, q in panels], solids)
+    cloud = scene_cloud(case, np.array([q for _, q in panels]), solids)
     low, high = cloud.min(axis=0), cloud.max(axis=0)
-    middle = 0.5 * (low + high)
-    seen = views(case, middle, max(0.5 * float(np.linalg.norm(high - low)), 1e-12))
-    extent = np.maximum(high - low, LEAST * max(float((high - low).max()), 1e-9)) * (1.0 + 2.0 * MARGIN)
-    sizes = [float(extent @ np.abs(row)) for row in (seen["front"].across, seen["top"].along, seen["front"].along)]
-    columns, lines = _legend(case, load_case)
-    places, inches, scale = _arrange(sizes, len(panels), HEAD + LINE * lines)
+    radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-12)
+    seen = views(case, 0.5 * (low + high), radius)
+    marks = {
+        name: [marks_at(case, symbols(case, load_case, t), q, view.seen, radius, view.signs) for t, q in panels]
+        for name, view in seen.items()
+    }
+    names = legend_names(case, load_case)
+    columns = columns_of(names, PAGE - 0.1, COLUMNS)
+    (places, inches), box, scale = _adapted(
+        seen, (low, high), marks, len(panels), height_of(len(names), columns, legend_title(case, thick))
+    )
     figure = module.Figure(figsize=inches)
     figure.set_layout_engine("none")  # the panels' places give all views one scale
     for k, (t, q) in enumerate(panels):
         for name, view in seen.items():
             x, y, width, height = places[k][name]
             axis = figure.add_axes((x / inches[0], y / inches[1], width / inches[0], height / inches[1]))
-            draw_frame(axis, view, np.array([width, height]) / scale, cloud)
+            size = np.array([width, height])
+            if np.isfinite(view.eye):
+                every = [mark for some in marks[name] for mark in some]
+                draw_perspective(axis, view, window(view.seen(cloud), every, size), size)
+            else:
+                _draw_frame(axis, view, size / scale, box)
             draw_scene(axis, source, view, q, solids)
             draw_members(axis, source, q, view.seen, thick)
-            draw_symbols(axis, case, symbols(case, load_case, t), q, view.seen)
+            draw_marks(axis, marks[name][k])
             words = name if t is None or name != "front" else f"{name}, t = {t:g} s"
             axis.set_title(words, loc="left")
     handles, labels = legend_handles(figure.axes[0])
     title = legend_title(case, thick)
-    figure.legend(handles, labels, loc="upper left", ncols=columns, title=title, alignment="left", borderaxespad=0.3)
+    figure.legend(handles, labels, loc="upper left", ncols=columns, title=title, **SETTING)
     return figure
 
 
 _Places = list[dict[str, tuple[float, float, float, float]]]
 
 
-def _legend(case: Case, load_case: str | None) -> tuple[int, int]:
-    """How many columns and lines the names in the legend take, at most six columns."""
-    groups = dict.fromkeys(families(case))
-    names = [*(body.name for body in case.bodies), GROUND, *["contact"] * bool(surfaces_of(case))]
-    names += {glyphs()[each.kind].words: None for each in symbols(case, load_case)}
-    names += groups if len(groups) <= MOST_NAMED else []
-    wide = BESIDE + LETTER * max(map(len, names))
-    columns = min(6, max(1, int((PAGE - 0.2) / wide)), len(names))
-    return columns, -(-len(names) // columns)
+def _adapted(
+    seen: Mapping[str, View],
+    box: tuple[Floats, Floats],
+    marks: Mapping[str, list[list[Mark]]],
+    count: int,
+    legend: float,
+) -> tuple[tuple[_Places, tuple[float, float]], tuple[Floats, Floats], float]:
+    """Where panels are and the picture's size, between which places (3,) everything is seen, inches in a metre.
+
+    seen: the views.
+    box: lowest and highest coordinates (3,) of what is drawn.
+    marks: of each view and state the symbols, which are seen whole.
+    count: states.
+    legend: its height in inches.
+    """
+    low, high = box
+    first, last = box
+    for _ in range(ROUNDS):
+        least = LEAST * max(float((last - first).max()), 1e-9)
+        extent = np.maximum(last - first, least)
+        sizes = [float(extent @ np.abs(row)) for row in (seen["front"].across, seen["top"].along, seen["front"].along)]
+        places, inches, scale = _arrange(sizes, count, legend)
+        room = 1.0 / (72.0 * scale)
+        first, last = low - FREE * room, high + FREE * room
+        for name in ("front", "top", "side"):
+            view = seen[name]
+            at, reach = places_and_reaches([mark for some in marks[name] for mark in some])
+            for k, way in enumerate((view.across, view.along)):
+                number = int(np.argmax(np.abs(way)))
+                ends = np.sort(view.signs[k] * (reach[..., k] + AROUND * np.array([-1.0, 1.0])), axis=1) * room
+                first[number] = min(first[number], float((at[:, k] + ends[:, 0]).min(initial=np.inf)))
+                last[number] = max(last[number], float((at[:, k] + ends[:, 1]).max(initial=-np.inf)))
+    return (places, inches), (first, last), scale
 
 
 def _arrange(sizes: list[float], count: int, legend: float) -> tuple[_Places, tuple[float, float], float]:
@@ -108,21 +146,6 @@ def _arrange(sizes: list[float], count: int, legend: float) -> tuple[_Places, tu
             own[name] = (x, y, scale * columns[column], scale * rows[row + k])
         places.append(own)
     return places, (PAGE, height), scale
-
-
-def scene_cloud(case: Case, states: list[Floats], solids: dict[str, Solid]) -> Floats:
-    """(n, 3) places between which everything is that is drawn, without what lies far outside of the design."""
-    own = {name: np.concatenate([points_of(case, name), shape.corners]) for name, shape in solids.items()}
-    for each in surfaces_of(case):
-        if not each.endless:
-            own[each.body] = np.concatenate([own[each.body], *each.lines])
-    every = np.concatenate([points_at(case, name, own[name], np.array(states)).reshape(-1, 3) for name in own])
-    designed = [ends_at(case, group, q).reshape(-1, 3) for q in states for group in case.design_groups]
-    if case.design_groups:
-        inner = np.concatenate([*designed, *(q.reshape(-1, 7)[:, :3] for q in states)])
-        if float(np.ptp(every, axis=0).max()) > FAR * float(np.ptp(inner, axis=0).max()) > 0.0:
-            return inner
-    return every
 
 
 def draw_scene(axis: Any, source: Source, view: View, q: Floats, solids: dict[str, Solid]) -> None:
@@ -156,10 +179,10 @@ def _outline(axis: Any, view: View, corners: Floats, shape: Solid, own: str) -> 
     elif len(shape.faces):
         _faces(axis, view, flat, shape, own)
     front = _in_front(view, corners, shape)
-    width = 0.8 if shape.faces else 1.6
+    width, full = (0.8, 1.0) if shape.faces else (1.1, 0.6)  # lines alone are fainter than members
     near = [flat[list(edge)] for edge in shape.edges if (min(edge), max(edge)) in front or not shape.faces]
     far = [flat[list(edge)] for edge in shape.edges if (min(edge), max(edge)) not in front and shape.faces]
-    for lines, alpha, order in ((near, 1.0, 2.1), (far, 0.3, 1.5)):
+    for lines, alpha, order in ((near, full, 2.1), (far, 0.3, 1.5)):
         axis.add_collection(
             LineCollection(lines, colors=own, linewidths=width, alpha=alpha, zorder=order), autolim=False
         )
@@ -169,7 +192,7 @@ def _faces(axis: Any, view: View, flat: Floats, shape: Solid, own: str) -> None:
     """The faces that look to the eye, each as one area without a border."""
     from matplotlib.collections import PolyCollection
 
-    turn = np.array([_sign(view.across), _sign(view.along)])
+    turn = view.signs
     some = []
     for face in shape.faces:
         x, y = (flat[list(face)] * turn).T
@@ -186,46 +209,41 @@ def _in_front(view: View, corners: Floats, shape: Solid) -> set[tuple[int, int]]
         return set(shape.edges)
     found = set()
     for face in shape.faces:
-        flat = view.seen(corners[list(face)]) * np.array([_sign(view.across), _sign(view.along)])
+        flat = view.seen(corners[list(face)]) * view.signs
         x, y = flat.T
         if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0.0:
             found |= {(min(a, b), max(a, b)) for a, b in zip(face, (*face[1:], face[0]), strict=True)}
     return found
 
 
-def _sign(direction: Floats) -> float:
-    """-1 of an axis of the case that a view shows backwards."""
-    return -1.0 if direction.min() == -1.0 else 1.0
-
-
-def draw_frame(axis: Any, view: View, size: Floats, cloud: Floats) -> None:
-    """The window and the axes. size: of the window in m; cloud (n, 3): what is to be seen."""
+def _draw_frame(axis: Any, view: View, size: Floats, box: tuple[Floats, Floats]) -> None:
+    """The window and the axes. size: of the window in m; box: lowest and highest coordinates (3,) that are seen."""
     axis.set_aspect("equal", adjustable="box")
-    if np.isfinite(view.eye):
-        _corner(axis, view, size, cloud)
-        return
     for k, way in enumerate((view.across, view.along)):
         number = int(np.argmax(np.abs(way)))
-        centre = 0.5 * float(cloud[:, number].min() + cloud[:, number].max())
-        ends = centre - 0.5 * _sign(way) * size[k], centre + 0.5 * _sign(way) * size[k]
+        centre = 0.5 * float(box[0][number] + box[1][number])
+        ends = centre - 0.5 * view.signs[k] * size[k], centre + 0.5 * view.signs[k] * size[k]
         (axis.set_xlim if k == 0 else axis.set_ylim)(*ends)
         (axis.set_xlabel if k == 0 else axis.set_ylabel)(f"{'xyz'[number]}, m")
 
 
-def _corner(axis: Any, view: View, size: Floats, cloud: Floats) -> None:
-    """Perspective: a window around everything, without a scale but with the axes' directions in a corner."""
-    seen = view.seen(cloud)
-    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    wide = max(float((np.ptp(seen, axis=0) / size).max()), 1e-12) * (1.0 + 2.0 * MARGIN) * size
+def draw_perspective(axis: Any, view: View, box: tuple[Floats, Floats], inches: Floats) -> None:
+    """A window without a scale but with the axes' directions in a corner.
+
+    box: lower left and upper right corner (2,) of what is seen. inches (2,): the size of the window.
+    """
+    axis.set_aspect("equal", adjustable="box")
+    low, high = box
+    wide = inches * float(((high - low) / inches).max())
+    middle = 0.5 * (low + high)
     axis.set_xlim(middle[0] - 0.5 * wide[0], middle[0] + 0.5 * wide[0])
     axis.set_ylim(middle[1] - 0.5 * wide[1], middle[1] + 0.5 * wide[1])
     axis.set_xticks([])
     axis.set_yticks([])
     for spine in axis.spines.values():
         spine.set_visible(False)
-    inches = float(axis.get_position().width * axis.figure.get_figwidth())
     foot = middle + np.array([-0.42, -0.42]) * wide
-    for k, own in enumerate(_AXES):
-        way = ARROW * wide[0] / inches * np.array([view.across[k], view.along[k]])
+    for k, own in enumerate(_AXES_ON_DARK if is_dark() else _AXES):
+        way = ARROW * wide[0] / inches[0] * np.array([view.across[k], view.along[k]])
         axis.plot(*np.array([foot, foot + way]).T, "-", color=own, linewidth=1.2, clip_on=False)
         axis.text(*(foot + 1.35 * way), "xyz"[k], color=own, ha="center", va="center", fontsize=8)

@@ -1,54 +1,80 @@
 """One drawing of a scene for several states: the same window for all, in perspective where bodies are in space."""
 
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mdstopo.case.model import GROUND
-from mdstopo.plots.body_shapes import planar_shapes
-from mdstopo.plots.layout_plot import draw_bodies, draw_state
+from mdstopo.plots.cloud import planar_cloud, scene_cloud
+from mdstopo.plots.drawn_plane import draw_bodies, draw_state, marks_of
 from mdstopo.plots.member_lines import draw_members
-from mdstopo.plots.scenery import Floats, ends_at, own_points
+from mdstopo.plots.scenery import Floats
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
-from mdstopo.plots.space_layout import draw_frame, draw_scene, scene_cloud
+from mdstopo.plots.space_layout import draw_perspective, draw_scene
 from mdstopo.plots.style import colour
-from mdstopo.plots.symbol_marks import draw_symbols
+from mdstopo.plots.symbol_marks import Mark, draw_marks, marks_at
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.thickness import Thickness
 from mdstopo.plots.views import views
+from mdstopo.plots.window import scale_of, window
 from mdstopo.scene.point_positions import points_at
 
-#: share of the window that is left free
-MARGIN = 0.08
+#: at most so many states are looked at for room for their symbols
+STATES = 40
+#: inches that the number of a tick needs below a drawing and beside it; ticks at most
+ACROSS, UP, MOST_TICKS = 0.42, 0.16, 8
 
 
 class Stage:
-    """Draws the states (T, n) of a result, in a plane or as views of space."""
+    """Draws the states (T, n) of a result, in a plane or as a view of space.
 
-    def __init__(self, source: Source, states: Floats) -> None:
+    load_case, times: whose loads are shown, and when; None of a time shows each at its largest.
+    """
+
+    def __init__(
+        self, source: Source, states: Floats, load_case: str | None = None, times: Sequence[float | None] = ()
+    ) -> None:
         self.source, self.case = source, source.case
         self.names = [*(body.name for body in self.case.bodies), GROUND]
+        chosen = np.unique(np.linspace(0, len(states) - 1, STATES).astype(int)).tolist()
+        self._windows: dict[tuple[float, ...], tuple[Floats, Floats]] = {}
+        self._seen = [(states[k], (load_case, times[k] if times else None)) for k in chosen]
         if self.case.dimension == 3:
             self.solids = {name: solid(self.case, name) for name in self.names}
-            self.cloud = scene_cloud(self.case, list(states), self.solids)
-            low, high = self.cloud.min(axis=0), self.cloud.max(axis=0)
-            radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-12)
-            self.view = views(self.case, 0.5 * (low + high), radius)["perspective"]
+            cloud = scene_cloud(self.case, states, self.solids)
+            low, high = cloud.min(axis=0), cloud.max(axis=0)
+            self.radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-12)
+            self.view = views(self.case, 0.5 * (low + high), self.radius)["perspective"]
+            self.cloud = self.view.seen(cloud)
         else:
-            self.cloud = self._planar_cloud(states)
+            self.cloud = planar_cloud(self.case, states)
 
-    def _planar_cloud(self, states: Floats) -> Floats:
-        pieces = [states[:, 3 * k : 3 * k + 2] for k in range(len(self.case.bodies))]
-        for name in self.names:
-            corners = [own_points(self.case, name)]
-            corners += [area for shape in planar_shapes(self.case, name) for area in shape.areas]
-            pieces.append(points_at(self.case, name, np.concatenate(corners), states).reshape(-1, 2))
-        return np.concatenate(pieces)
+    def window(self, inches: Floats) -> tuple[Floats, Floats]:
+        """Lower left and upper right corner (2,) on the paper of what is seen in a picture of this size (2,)."""
+        known = self._windows.get(tuple(inches.tolist()))
+        if known is not None:
+            return known
+        scale = scale_of(self.cloud.min(axis=0), self.cloud.max(axis=0), inches)
+        marks = [mark for q, shown in self._seen for mark in self._marks(q, shown, scale)]
+        found = window(self.cloud, marks, inches)
+        self._windows[tuple(inches.tolist())] = found
+        return found
+
+    def _marks(self, q: Floats, shown: tuple[str | None, float | None], scale: float) -> list[Mark]:
+        if self.case.dimension == 2:
+            return marks_of(self.case, q, shown, scale)
+        return marks_at(self.case, symbols(self.case, *shown), q, self.view.seen, self.radius)
 
     def draw(
-        self, axis: Any, q: Floats, thick: Thickness, shown: tuple[str | None, float | None], faint: float = 1.0
+        self,
+        axis: Any,
+        q: Floats,
+        thick: Thickness,
+        shown: tuple[str | None, float | None],
+        inches: Floats,
+        faint: float = 1.0,
     ) -> None:
         """Everything at a state q.
 
@@ -56,20 +82,30 @@ class Stage:
         q: the state.
         thick: how thick members are.
         shown: the load case whose loads are drawn, and the time of them.
+        inches (2,): the size of the drawing.
         faint: how much of the colours of bodies is left, for overlays.
         """
+        low, high = self.window(inches)
+        axis.set_aspect("equal", adjustable="box")
         if self.case.dimension == 3:
-            draw_frame(axis, self.view, np.array([1.4, 1.0]), self.cloud)
+            draw_perspective(axis, self.view, (low, high), inches)
             draw_scene(axis, self.source, self.view, q, self.solids)
             draw_members(axis, self.source, q, self.view.seen, thick)
-            draw_symbols(axis, self.case, symbols(self.case, *shown), q, self.view.seen)
+            draw_marks(axis, self._marks(q, shown, scale_of(low, high, inches)))
             return
-        draw_state(axis, self.source, q, thick, shown, faint)
-        low, high = self.cloud.min(axis=0), self.cloud.max(axis=0)
-        room = MARGIN * max(float((high - low).max()), 1e-9)
-        axis.set_aspect("equal", adjustable="box")
-        axis.set_xlim(low[0] - room, high[0] + room)
-        axis.set_ylim(low[1] - room, high[1] + room)
+        scale = scale_of(low, high, inches)
+        free = 72.0 * float(inches[1]) / scale - (high - low)[1]  # of a flat scene, above and below
+        axis.set_xlim(low[0], high[0])
+        axis.set_ylim(low[1] - 0.5 * free, high[1] + 0.5 * free)
+        for name, length, needed in (("x", float(inches[0]), ACROSS), ("y", float(inches[1]), UP)):
+            axis.locator_params(axis=name, nbins=max(1, min(MOST_TICKS, int(length / needed))))
+        for each in (axis.xaxis, axis.yaxis):
+            each.set_major_formatter(lambda number, _: f"{number:g}".replace("-", "\u2212"))
+        axis.set_xlabel("x, m")
+        axis.set_ylabel("y, m")
+        loaded = self.case.load_cases[0] if shown[0] is None else self.case.load_case(shown[0])
+        gravity = np.array(loaded.gravity, dtype=np.float64)
+        draw_state(axis, self.source, q, thick, self._marks(q, shown, scale), gravity, faint)
 
     def draw_bodies(self, axis: Any, q: Floats, faint: float) -> None:
         """Bodies alone. faint: how much of their colours is left."""
@@ -84,9 +120,3 @@ class Stage:
     def seen(self, places: Floats) -> Floats:
         """Coordinates (n, 2) on the paper of places (n, d) in the scene."""
         return self.view.seen(places) if self.case.dimension == 3 else places
-
-    def ends(self, q: Floats) -> Any:
-        """Where members are drawn on the paper at a state, a function of their group."""
-        if self.case.dimension == 3:
-            return lambda group: self.view.seen(ends_at(self.case, group, q))
-        return partial(ends_at, self.case, q=q)

@@ -1,6 +1,7 @@
-"""Symbols of joints, loads and motions in pictures."""
+"""Symbols of joints, loads and motions in pictures, and of ground."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,72 +16,125 @@ from mdstopo.plots.symbols import Symbol, placed
 SHORTEST = 0.45
 #: below this share of its length a direction points to the eye, or away
 END_ON = 0.2
+#: points between a symbol and that of the ground below it
+BELOW = 0.8
+#: points: how large a symbol is in a legend, at most
+LARGEST = 13.0
+#: coordinates on the paper that run to the right and up
+AHEAD = np.ones(2)
 
 
-def draw_symbols(axis: Any, case: Case, found: list[Symbol], q: Floats, seen: Callable[[Floats], Floats]) -> None:
-    """Symbols at a state q. seen: places (n, d) on the paper (n, 2)."""
-    named: set[str] = set()
-    size = float(np.ptp(np.concatenate([axis.get_xlim(), axis.get_ylim()]))) or 1.0
+@dataclass(frozen=True)
+class Mark:
+    """A symbol on the paper: where it stands (2,), the place of its other end (2,), the angle of its direction, its
+    size, whether it turns clockwise, what the legend names it by where it may be seen end on here.
+
+    is_tie: whether it is that of a joint or a bushing; below: points by which it is moved down the paper.
+    """
+
+    glyph: Glyph
+    place: Floats
+    end: Floats | None = None
+    angle: float = 0.0
+    scale: float = 1.0
+    mirrored: bool = False
+    label: Glyph | None = None
+    is_tie: bool = False
+    below: float = 0.0
+
+    @property
+    def strokes(self) -> list[Floats]:
+        """Its lines (n, 2) in points around its place."""
+        c, s = self.scale * np.cos(self.angle), self.scale * np.sin(self.angle)
+        turn, flip = np.array([[c, s], [-s, c]]), np.array([1.0, -1.0 if self.mirrored else 1.0])
+        return [(stroke * flip) @ turn - np.array([0.0, self.below]) for stroke in self.glyph.strokes]
+
+    @property
+    def reach(self) -> Floats:
+        """(2, 2) points from its place to its lower left and its upper right corner."""
+        cloud = np.concatenate(self.strokes)
+        return np.array([cloud.min(axis=0), cloud.max(axis=0)])
+
+
+def marks_at(
+    case: Case, found: list[Symbol], q: Floats, seen: Callable[[Floats], Floats], size: float, signs: Floats = AHEAD
+) -> list[Mark]:
+    """Symbols at a state.
+
+    case: whose.
+    found: which.
+    q: the state.
+    seen: places (n, d) on the paper (n, 2).
+    size: of the scene, m.
+    signs (2,): -1 where coordinates on the paper run backwards.
+    """
+    marks = []
     for symbol in found:
         at, way, end = placed(case, symbol, q)
-        glyph = glyphs()[symbol.kind]
-        label = glyph if glyph.words not in named else None
-        named.add(glyph.words)
-        here = seen(at[None])[0]
-        if end is not None:
-            there = seen(end[None])[0]
-            axis.plot(*np.array([here, there]).T, "-", color=ink(), linewidth=1.2, zorder=3.0)
-            draw_glyph(axis, glyph, there)
-        angle, scale, turned = 0.0, 1.0, symbol.size < 0.0
+        named = glyph = glyphs()[symbol.kind]
+        angle, scale = 0.0, 1.0
         if way is not None:
             ends = seen(np.array([at, at + 0.01 * size * way]))
-            flat = (ends[1] - ends[0]) / (0.01 * size)
-            length = float(np.hypot(*flat))
-            if length < END_ON and symbol.kind in ("load", "motion", "held"):
+            flat = signs * (ends[1] - ends[0]) / (0.01 * size)
+            if float(np.hypot(*flat)) < END_ON and symbol.kind in ("load", "motion", "held"):
                 glyph = glyphs()["distance"]  # end on: a dot
             angle = float(np.arctan2(flat[1], flat[0]))
         if symbol.kind == "load":
             scale = max(SHORTEST, abs(symbol.size))
         elif symbol.kind in ("motion", "turning"):
             scale = 0.8
-        draw_glyph(axis, glyph, here, angle, scale, turned, label)
+        there = None if end is None else seen(end[None])[0]
+        place = seen(at[None])[0]
+        marks.append(Mark(glyph, place, there, angle, scale, symbol.size < 0.0, named, symbol.is_tie))
+    return marks
 
 
-def draw_glyph(
-    axis: Any,
-    glyph: Glyph,
-    place: Floats,
-    angle: float = 0.0,
-    scale: float = 1.0,
-    mirrored: bool = False,
-    label: Glyph | None = None,
-) -> None:
-    """One symbol in points, whatever the scale of the picture.
+def ground_marks(places: Floats, others: list[Mark], scale: float) -> list[Mark]:
+    """The symbol of ground at places (n, 2) on the paper, each below the joints and bushings that it would lie over.
 
-    axis: of the picture.
-    glyph: its lines.
-    place: where it stands, in data.
-    angle: of its direction, rad.
-    scale: its size.
-    mirrored: whether what turns counterclockwise turns clockwise.
-    label: what the legend names it by, which may be seen end on here; None has no entry.
+    others: all other symbols. scale: points (1/72 inch) in a metre.
     """
+    glyph = glyphs()["ground"]
+    found = []
+    for place in places:
+        mark = Mark(glyph, place)
+        for other in others:
+            for end in (other.place, other.place if other.end is None else other.end) if other.is_tie else ():
+                own, its = mark.reach, other.reach + scale * (end - place)
+                if (own[0] < its[1]).all() and (its[0] < own[1]).all():
+                    mark = replace(mark, below=max(mark.below, BELOW - float(its[0, 1])))
+        found.append(mark)
+    return found
+
+
+def draw_marks(axis: Any, marks: list[Mark]) -> None:
+    """Symbols, each kind with an entry in the legend."""
+    named: set[str] = set()
+    for mark in marks:
+        if mark.end is not None:
+            axis.plot(*np.array([mark.place, mark.end]).T, "-", color=ink(), linewidth=1.2, zorder=3.0)
+            draw_mark(axis, replace(mark, place=mark.end))
+        draw_mark(axis, mark)
+        if mark.label is not None and mark.label.words not in named:
+            named.add(mark.label.words)
+            path = _all_of(mark.label)
+            size = min(LARGEST, 2.0 * float(np.abs(path.vertices).max()))
+            axis.plot([], [], marker=path, markersize=size, color=ink(), markeredgewidth=0.7,
+                      markerfacecolor="none", linestyle="none", label=mark.label.words)  # fmt: skip
+
+
+def draw_mark(axis: Any, mark: Mark, **how: Any) -> None:
+    """One symbol in points, whatever the scale of the picture. how: other settings of its lines."""
     from matplotlib.path import Path
 
-    c, s = scale * np.cos(angle), scale * np.sin(angle)
-    turn = np.array([[c, s], [-s, c]])
-    for stroke in glyph.strokes:
-        flat = (stroke * np.array([1.0, -1.0 if mirrored else 1.0])) @ turn
+    for stroke, flat in zip(mark.glyph.strokes, mark.strokes, strict=True):
         is_closed = bool(np.array_equal(stroke[0], stroke[-1]))
-        fill = {"paper": paper(), "ink": ink()}.get(glyph.fill, "none") if is_closed else "none"
+        fill = {"paper": paper(), "ink": ink()}.get(mark.glyph.fill, "none") if is_closed else "none"
+        settings = {"markeredgecolor": ink(), "markeredgewidth": 0.8, "linestyle": "none", "zorder": 3.2, **how}
         axis.plot(
-            *place[:, None], marker=Path(flat), markersize=2.0 * float(np.abs(flat).max()), color=ink(),
-            markerfacecolor=fill, markeredgecolor=ink(), markeredgewidth=0.8, linestyle="none",
-            zorder=3.2,
+            *mark.place[:, None], marker=Path(flat), markersize=2.0 * float(np.abs(flat).max()), color=ink(),
+            markerfacecolor=fill, **settings,
         )  # fmt: skip
-    if label is not None:
-        axis.plot([], [], marker=_all_of(label), markersize=9.0, color=ink(), markeredgewidth=0.7,
-                  markerfacecolor="none", linestyle="none", label=label.words)  # fmt: skip
 
 
 def _all_of(glyph: Glyph) -> Any:
@@ -90,11 +144,3 @@ def _all_of(glyph: Glyph) -> Any:
     cloud = np.concatenate(glyph.strokes)
     middle = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
     return Path.make_compound_path(*(Path(stroke - middle) for stroke in glyph.strokes))
-
-
-def legend_handles(axis: Any) -> tuple[list[Any], list[str]]:
-    """The entries of a legend, those of symbols last."""
-    handles, labels = axis.get_legend_handles_labels()
-    symbols = {glyph.words for glyph in glyphs().values()}
-    order = sorted(range(len(labels)), key=lambda k: labels[k] in symbols)
-    return [handles[k] for k in order], [labels[k] for k in order]

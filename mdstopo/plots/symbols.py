@@ -18,6 +18,8 @@ TINY = 1e-6
 SAMPLES = 201
 #: kinds that change with time
 LOADS = ("load", "moment")
+#: kinds of prescribed motions
+MOTIONS = ("motion", "turning", "held", "unturned")
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,11 @@ class Symbol:
     way: Floats | None = None
     axes: str = GROUND
     size: float = 1.0
+
+    @property
+    def is_tie(self) -> bool:
+        """Whether it is that of a joint or a bushing."""
+        return self.kind not in (*LOADS, *MOTIONS)
 
 
 def symbols(case: Case, load_case: str | None = None, time: float | None = None) -> list[Symbol]:

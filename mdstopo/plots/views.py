@@ -36,6 +36,13 @@ class View:
         closer = 1.0 - (away @ self.toward) / self.eye
         return np.stack([away @ self.across, away @ self.along], axis=-1) / closer[..., None]
 
+    @property
+    def signs(self) -> Floats:
+        """(2,) -1 where an axis of the case runs to the left, or down, on the paper: its limits are turned round."""
+        if np.isfinite(self.eye):
+            return np.ones(2)
+        return np.array([-1.0 if way.min() == -1.0 else 1.0 for way in (self.across, self.along)])
+
     def depth(self, places: Floats) -> Floats:
         """(...) how near to the eye places (..., 3) are."""
         near: Floats = places @ self.toward

@@ -36,6 +36,20 @@ const symbolsAt = (data, load, time) => {
   const share = own.end > own.start && time !== null ? (time - own.start) / (own.end - own.start) : 0;
   return own.still.concat(own.loads[Math.max(0, Math.min(many - 1, Math.round(share * (many - 1))))] || []);
 };
+// names of bodies [name, place on the screen, colour] beside crosses, none over another and none cut
+const writeNames = (g, width, names) => {
+  const written = [];
+  g.font = "13px system-ui, sans-serif"; g.textAlign = "start"; g.globalAlpha = 1;
+  for (const [name, p, colour] of names) {
+    const wide = g.measureText(name).width, x = Math.max(2, Math.min(p[0] + 6, width - wide - 2));
+    g.fillStyle = colour; g.fillRect(p[0] - 4, p[1] - 0.75, 8, 1.5); g.fillRect(p[0] - 0.75, p[1] - 4, 1.5, 8);
+    let y = Math.max(p[1] - 6, 14); // below the names that would be written over
+    while (written.some(([x0, y0, w]) => x < x0 + w && x0 < x + wide && Math.abs(y - y0) < 14)) y += 14;
+    written.push([x, y, wide]);
+    if (g.strokeText) { g.lineWidth = 3; g.strokeStyle = "#ffffff"; g.strokeText(name, x, y); }
+    g.fillStyle = colour; g.fillText(name, x, y);
+  }
+};
 // a canvas as sharp as the screen is; what draws on it counts in the pixels of the page
 const sharpened = (canvas, width, height) => {
   const ratio = Math.min(3, globalThis.devicePixelRatio || 1), g = canvas.getContext("2d");

@@ -10,11 +10,14 @@ from mdstopo.case.model import GROUND, Case
 from mdstopo.case.responses.response_units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared, kept_iterates
+from mdstopo.plots.beside import lanes
 from mdstopo.plots.body_shapes import planar_shapes
+from mdstopo.plots.cloud import FAR
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.objectives_over_time import response_history
 from mdstopo.plots.scenery import points_of, start_state
+from mdstopo.plots.slack import CORNERS, DEEPEST, SLACK, belt_lengths, down
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.surface_lines import surfaces_of
@@ -61,6 +64,8 @@ def content(source: Source) -> dict[str, Any]:
         "bodies": _bodies(case),
         "start": _rounded(start_state(case)),
         "symbols": _symbols(case),
+        "far": FAR,
+        "hang": {"slack": SLACK, "deepest": DEEPEST, "corners": CORNERS, "down": _rounded(down(case))},
         "designs": _designs(source),
     }  # fmt: skip
     if case.dimension > 2:
@@ -262,20 +267,27 @@ def _objective(case: Case, name: str) -> Any:
 
 
 def _members(source: Source, alpha: Floats) -> tuple[dict[str, Any], Chosen]:
-    """Members that are thick enough to be seen, the thickest first where there are many; and which they are."""
+    """Members that are thick enough to be seen, the thickest first where there are many; and which they are.
+
+    Rows of: the number of the group, of both bodies, the ends in their coordinates, the thickness, the number in the
+    group, the place beside others of the same ends (`lanes`), the length as a belt or null.
+    """
     case = source.case
     thick = thickness(source, alpha[: case.n_design])
     index, named = _numbers(case), families(case)
     order = list(dict.fromkeys(named))
     kept, rows = [], []
-    every = zip(case.members, thick.shares, strongest(thick.shares, DRAWN), named, strict=True)
-    for group, share, chosen, family in every:
+    strong = strongest(thick.shares, DRAWN)
+    every = zip(case.members, thick.shares, strong, lanes(case, strong), named, strict=True)
+    for group, share, chosen, lane, family in every:
         kept.append((group, chosen))
+        belts = belt_lengths(case, group)
         a, b = index[group.body_from], index[group.body_to]
         p, q = group.p_local[chosen], group.q_local[chosen]
         for k, i in enumerate(chosen.tolist()):
             own = [*_rounded(p[k]), *_rounded(q[k]), round(float(share[i]), 3), i]
-            rows.append([order.index(family), a, b, *own])
+            beside = [float(lane[k]), None if belts is None else _rounded(belts[i])]
+            rows.append([order.index(family), a, b, *own, *beside])
     fixed = [all(not group.design for group, each in zip(case.members, named, strict=True) if each == family)
              for family in order]  # fmt: skip
     found = {"groups": order, "fixed": fixed, "what": thick.what, "rows": rows, "all": case.n_members}

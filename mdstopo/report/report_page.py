@@ -11,7 +11,7 @@ def page(data: dict[str, Any]) -> str:
     """The page of a report as one HTML file, which needs nothing else."""
     folder = files("mdstopo.report")
     scene = "scene_space.js" if data["dimension"] > 2 else "scene_plane.js"
-    names = ("page.css", "glyphs.js", scene, "page.js", "page.html")
+    names = ("page.css", "glyphs.js", "members.js", scene, "page.js", "page.html")
     style, *scripts, body = ((folder / name).read_text(encoding="utf-8") for name in names)
     # neither "</script" nor "<!--<script" in a case file may mean anything to the page
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

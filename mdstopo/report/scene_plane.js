@@ -13,19 +13,25 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
   };
   const indexOf = (body, b) => (body.name === "ground" && b === data.bodies.length - 1 ? count : b);
 
+  const lineOf = (row, q) => memberLine(data.hang, place(row[1], row.slice(3, 5), q), place(row[2], row.slice(5, 7), q), row[10]);
+
   // one window for all frames of a motion, so that it stands still
   let view = null;
   const fit = (rows) => {
-    const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
-    const take = (p) => { for (const k of [0, 1]) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); } };
-    const m = motion();
-    const frames = m ? m.q.filter((_, i) => i % 8 === 0 || i === m.q.length - 1) : [data.start];
-    for (const q of frames) data.bodies.forEach((body, b) => {
-      const index = indexOf(body, b), all = body.areas.flat(2).concat(body.lines.flat(), body.arms.flat(), body.borders.flat(), body.points);
-      for (const p of index < count ? all.concat([[0, 0]]) : all) take(place(index, p, q));
-    });
-    for (const q of frames) for (const row of rows) { take(place(row[1], row.slice(3, 5), q)); take(place(row[2], row.slice(5, 7), q)); }
-    const room = 42;
+    const low = [Infinity, Infinity], high = [-Infinity, -Infinity], inner = [], all = [];
+    const m = motion(), fixed = data.designs.find((each) => each.members).members.fixed;
+    const frames = m ? m.q.filter((_, i) => rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
+    for (const q of frames) {
+      data.bodies.forEach((body, b) => {
+        const index = indexOf(body, b), shape = body.areas.flat(2).concat(body.lines.flat()).map((p) => place(index, p, q));
+        for (const p of shape.concat(body.arms.flat().concat(body.borders.flat(), body.points).map((p) => place(index, p, q)))) all.push(p);
+        if (index < count) for (const p of shape.concat([place(index, [0, 0], q)])) { inner.push(p); all.push(p); }
+      });
+      for (const row of rows) for (const p of lineOf(row, q).line) { all.push(p); if (!fixed[row[0]]) inner.push(p); }
+    }
+    const seen = fixed.every((each) => each) ? all : lookedAt(inner, all, data.far);
+    for (const p of seen) for (const k of [0, 1]) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
+    const room = 42; // for symbols and names
     const scale = Math.min((WIDTH - 2 * room) / Math.max(high[0] - low[0], 1e-9), (HEIGHT - 2 * room) / Math.max(high[1] - low[1], 1e-9));
     view = { scale, x: WIDTH / 2 - scale * (low[0] + high[0]) / 2, y: HEIGHT / 2 + scale * (low[1] + high[1]) / 2 };
   };
@@ -52,7 +58,8 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
     g.globalAlpha = 0.85;
     strokes(body.lines, q, index, colour, 2.2, [], false);
     g.globalAlpha = 0.7;
-    strokes(body.arms, q, index, colour, body.lines.length ? 1 : 3, body.lines.length ? [6, 4] : [], false);
+    const thin = body.lines.length || body.areas.length; // what reaches out of a shape
+    strokes(body.arms, q, index, colour, thin ? 1 : 3, thin ? [6, 4] : [], false);
     strokes(body.borders, q, index, colour, 1, [5, 4], true);
     g.globalAlpha = 1; g.fillStyle = colour;
     for (const point of body.points) { const p = screen(place(index, point, q)); g.fillRect(p[0] - 1.5, p[1] - 1.5, 3, 3); }
@@ -65,22 +72,10 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
       for (const point of each.points) { const p = screen(place(each.body, point, q)); g.beginPath(); g.arc(p[0], p[1], 2.5, 0, 2 * Math.PI); g.stroke(); }
     }
   };
-  const names = (q) => {
-    const written = [];
-    g.font = "13px system-ui, sans-serif"; g.textAlign = "start";
-    data.bodies.forEach((body, b) => {
-      const index = indexOf(body, b);
-      if (index === count) return;
-      const p = screen(place(index, [0, 0], q)), colour = colours[(b + 2) % colours.length], wide = g.measureText(body.name).width;
-      g.fillStyle = colour; g.fillRect(p[0] - 4, p[1] - 0.75, 8, 1.5); g.fillRect(p[0] - 0.75, p[1] - 4, 1.5, 8);
-      const x = Math.min(p[0] + 6, WIDTH - wide - 2);
-      let y = p[1] - 6; // below the names that would be written over
-      while (written.some(([x0, y0, w]) => x < x0 + w && x0 < x + wide && Math.abs(y - y0) < 14)) y += 14;
-      written.push([x, y, wide]);
-      if (g.strokeText) { g.lineWidth = 3; g.strokeStyle = "#ffffff"; g.strokeText(body.name, x, y); }
-      g.fillText(body.name, x, y);
-    });
-  };
+  const names = (q) => writeNames(g, WIDTH, data.bodies.flatMap((body, b) => {
+    const index = indexOf(body, b);
+    return index === count ? [] : [[body.name, screen(place(index, [0, 0], q)), colours[(b + 2) % colours.length]]];
+  }));
   // a length to measure by, and which way is down
   const measures = () => {
     const raw = WIDTH / 6 / view.scale, size = 10 ** Math.floor(Math.log10(raw)), length = [5, 2, 1].map((k) => k * size).find((s) => s <= raw * (1 + 1e-9));
@@ -100,11 +95,10 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
     contacts(q);
     const wide = Math.max(0.8, 3.2 - 0.9 * Math.log10(Math.max(1, rows.length / 10)));
     rows.forEach((row, k) => {
-      const p = screen(place(row[1], row.slice(3, 5), q)), r = screen(place(row[2], row.slice(5, 7), q));
+      const { line, slack } = lineOf(row, q);
       g.strokeStyle = colour(row, k);
       g.globalAlpha = coloured ? 0.9 : 0.45 + 0.45 * row[7];
-      g.lineWidth = 0.6 + wide * row[7];
-      g.beginPath(); g.moveTo(...p); g.lineTo(...r); g.stroke();
+      strokeMember(g, shifted(line.map(screen), row[9] * (1.4 + wide)), 0.6 + wide * row[7], slack);
     });
     for (const symbol of symbolsAt(data, load(), time)) {
       const at = place(symbol.body, symbol.at, q), o = symbol.way && place(symbol.axes, [0, 0], q), w = symbol.way && place(symbol.axes, symbol.way, q);

@@ -8,7 +8,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const DISTANCE = 4, GRID = "#c9c9c9", CONTACT = "#8a8a8a", AXES = ["#B22222", "#2E7D32", "#1F4FA3"]; // distance of the eye in radii
   const VIEWS = { front: [0, 0], top: [0, 90], side: [90, 0], perspective: [32, 24] }; // degrees: turn, rise
   const camera = { turn: 0, rise: 0, zoom: 1, x: 0, y: 0, flat: false };
-  let low = [0, 0, 0], high = [0, 0, 0], middle = [0, 0, 0], radius = 1, scale = 1, across, along, toward;
+  let cloud = [], shift = [0, 0], low = [0, 0, 0], high = [0, 0, 0], middle = [0, 0, 0], radius = 1, scale = 1, across, along, toward;
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const sum = (a, s, b, t) => [s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]];
@@ -36,32 +36,46 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const indexOf = (body, b) => (body.name === "ground" && b === data.bodies.length - 1 ? data.start.length / 7 : b);
 
   // x, y on the screen and how near it is
-  const seen = (p) => {
+  const seen = (p, zoom = camera.zoom) => {
     const r = sum(p, 1, middle, -1), near = dot(r, toward);
-    const s = scale * camera.zoom / (camera.flat ? 1 : Math.max(1 - near / (DISTANCE * radius), 0.02));
-    return [WIDTH / 2 + camera.x + s * dot(r, across), HEIGHT / 2 + camera.y - s * dot(r, along), near];
+    const s = scale * zoom / (camera.flat ? 1 : Math.max(1 - near / (DISTANCE * radius), 0.02));
+    return [WIDTH / 2 + zoom * shift[0] + camera.x + s * dot(r, across), HEIGHT / 2 + zoom * shift[1] + camera.y - s * dot(r, along), near];
   };
+
+  const lineOf = (row, all) => memberLine(data.hang, place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)), row[12]);
 
   // one window for all frames of a motion, so that it stands still
   const fit = (rows) => {
-    const m = motion(), cloud = [];
-    const frames = m ? m.q.filter((_, i) => i % 8 === 0 || i === m.q.length - 1) : [data.start];
+    const m = motion(), inner = [], every = [], fixed = data.designs.find((each) => each.members).members.fixed;
+    const frames = m ? m.q.filter((_, i) => rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
     frames.forEach((q, f) => {
       const all = seats(q);
       data.bodies.forEach((body, b) => {
-        const index = indexOf(body, b);
-        if (f && index === data.start.length / 7) return;
-        for (const p of body.corners.concat(body.points)) cloud.push(place(all[index], p));
+        const index = indexOf(body, b), moves = index < all.length - 1;
+        if (f && !moves) return;
+        for (const p of body.corners.concat(moves ? [[0, 0, 0]] : [])) { every.push(place(all[index], p)); if (moves) inner.push(place(all[index], p)); }
+        for (const p of body.points) every.push(place(all[index], p));
       });
-      for (const row of rows) cloud.push(place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)));
-      for (const surface of data.surfaces) if (!surface.endless) for (const p of surface.lines.flat()) cloud.push(place(all[surface.body], p));
+      for (const row of rows) for (const p of lineOf(row, all).line) { every.push(p); if (!fixed[row[0]]) inner.push(p); }
+      for (const surface of data.surfaces) if (!surface.endless) for (const p of surface.lines.flat()) every.push(place(all[surface.body], p));
     });
+    cloud = fixed.every((each) => each) ? every : lookedAt(inner, every, data.far);
     const reach = (pick, k) => cloud.reduce((a, p) => pick(a, p[k]), cloud.length ? cloud[0][k] : 0);
     low = [0, 1, 2].map((k) => reach(Math.min, k));
     high = [0, 1, 2].map((k) => reach(Math.max, k));
     middle = sum(low, 0.5, high, 0.5);
     radius = Math.max(0.5 * Math.hypot(...sum(high, 1, low, -1)), 1e-9);
-    scale = 0.56 * Math.min(WIDTH, HEIGHT) / radius;
+    frame();
+  };
+  // the scale and the place at which all is seen from where the eye is, with room for symbols and names
+  const frame = () => {
+    aim();
+    scale = 1; shift = [0, 0];
+    const least = [Infinity, Infinity], most = [-Infinity, -Infinity], room = 46;
+    for (const p of cloud) { const s = seen(p, 1); for (const k of [0, 1]) { least[k] = Math.min(least[k], s[k]); most[k] = Math.max(most[k], s[k]); } }
+    if (!cloud.length) return;
+    scale = Math.min(...[WIDTH, HEIGHT].map((whole, k) => (whole - 2 * room) / Math.max(most[k] - least[k], 0.02 * radius)));
+    shift = [0, 1].map((k) => -scale * ((least[k] + most[k]) / 2 - (k ? HEIGHT : WIDTH) / 2));
   };
 
   const stepOf = (length) => { const size = 10 ** Math.floor(Math.log10(length / 9)); return [1, 2, 5, 10].map((k) => k * size).find((s) => s >= length / 9 * (1 - 1e-9)); };
@@ -83,7 +97,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
         if (Math.abs(dot(up, toward)) < 0.02) continue; // the grid is seen from its edge
         const [near, far] = a[2] > b[2] ? [a, b] : [b, a], long = Math.hypot(near[0] - far[0], near[1] - far[1]) || 1;
         const out = [near[0] + 14 * (near[0] - far[0]) / long, near[1] + 14 * (near[1] - far[1]) / long + 4];
-        write(`${Number(c.toPrecision(6))}`, out, "#777777");
+        if (out[0] > 12 && out[0] < WIDTH - 12 && out[1] > 12 && out[1] < HEIGHT - 4) write(`${Number(c.toPrecision(6))}`, out, "#777777");
       }
     }
   };
@@ -118,7 +132,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
         const alpha = body.faces.length < 2 ? 0.15 : area < 0 ? 0.24 : 0.1; // those that look to the eye are stronger
         things.push([mean(points), () => polygon(points, own, alpha)]);
       }
-      for (const [m, n] of body.edges) things.push([(corners[m][2] + corners[n][2]) / 2, () => line(corners[m], corners[n], own, body.faces.length ? 1.2 : 2.4, 0.9)]);
+      for (const [m, n] of body.edges) things.push([(corners[m][2] + corners[n][2]) / 2, () => line(corners[m], corners[n], own, body.faces.length ? 1.2 : 1.5, body.faces.length ? 0.9 : 0.6)]);
       for (const p of body.points) { const s = seen(place(seat, p)); things.push([s[2], () => { g.globalAlpha = 1; g.fillStyle = own; g.fillRect(s[0] - 1.5, s[1] - 1.5, 3, 3); }]); }
       if (!fixed) names.push([body.name, seen(seat[3]), own]);
     });
@@ -127,9 +141,12 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
       for (let k = 1; k < flat.length; k++) things.push([(flat[k - 1][2] + flat[k][2]) / 2, () => line(flat[k - 1], flat[k], CONTACT, 0.8, 0.8)]);
     }
     rows.forEach((row, k) => {
-      const a = seen(place(all[row[1]], row.slice(3, 6))), b = seen(place(all[row[2]], row.slice(6, 9))), near = (a[2] + b[2]) / 2;
+      const { line: corners, slack } = lineOf(row, all), flat = corners.map((p) => seen(p)), near = (flat[0][2] + flat[flat.length - 1][2]) / 2;
       const clear = 0.8 + 0.2 * Math.max(-1, Math.min(1, near / radius)); // what is farther is paler
-      things.push([near, () => line(a, b, colour(row, k), 0.4 + 2.4 * row[9], clear * (coloured ? 0.95 : 0.25 + 0.7 * row[9]))]);
+      things.push([near, () => {
+        g.strokeStyle = colour(row, k); g.globalAlpha = clear * (coloured ? 0.95 : 0.25 + 0.7 * row[9]);
+        strokeMember(g, shifted(flat, row[11] * 3.4), 0.4 + 2.4 * row[9], slack);
+      }]);
     });
     for (const symbol of symbolsAt(data, load(), time)) {
       const centre = place(all[symbol.body], symbol.at), s = seen(centre), end = symbol.end && seen(place(all[symbol.end[0]], symbol.end[1]));
@@ -142,8 +159,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     }
     things.sort((a, b) => a[0] - b[0]);
     for (const [, paint] of things) paint();
-    g.font = "13px system-ui, sans-serif"; g.textAlign = "start";
-    for (const [name, p, own] of names) { line([p[0] - 4, p[1]], [p[0] + 4, p[1]], own, 1.5, 1); line([p[0], p[1] - 4], [p[0], p[1] + 4], own, 1.5, 1); write(name, [p[0] + 6, p[1] - 6], own); }
+    writeNames(g, WIDTH, names);
     corner();
     g.globalAlpha = 1;
   };
@@ -151,6 +167,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const look = (name) => {
     [camera.turn, camera.rise] = VIEWS[name].map((degrees) => degrees * Math.PI / 180);
     Object.assign(camera, { zoom: 1, x: 0, y: 0, flat: name !== "perspective" });
+    frame();
   };
   const turn = (dx, dy) => {
     camera.flat = false;

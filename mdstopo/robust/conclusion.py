@@ -1,5 +1,6 @@
 """What became of an uncertain case: nominal and robust values of the final design, and what a fresh sample says."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.case.objects.uncertain import Measure
+from mdstopo.case.responses.response_units import constrained
 from mdstopo.design_problem import sign_of
 from mdstopo.evaluation import Evaluation, FloatArray
 from mdstopo.robust.ensemble import NOMINAL, Ensemble
@@ -107,7 +109,7 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, workers: Po
                 float(found.constraints[i]) + row.bound, here, values if enough else None, sample,
             )
         )  # fmt: skip
-    warnings += tuple(_fitted(each) for each in results if each.is_fitted)
+    warnings += tuple(_fitted(case, each) for each in results if each.is_fitted)
     part = _part(case, sample, objectives, responses, results)
     if fresh is not None:
         part |= _check_part(case, fresh, trials, results)
@@ -154,11 +156,23 @@ def _robust(
     return Robust(name, measure.words, nominal, value, Estimate(sign * found.value, low, high), worse, kept, sign)
 
 
-def _fitted(found: Robust) -> str:
+def told(case: Case | None, name: str) -> str:
+    """What a result is called in words: an objective by its name, `constraints[i]` with what it bounds.
+
+    Without the case a constraint is told by its place alone.
+    """
+    place = None if case is None else re.fullmatch(r"constraints\[(\d+)\]", name)
+    if case is None or place is None:
+        return name
+    return f"{name} ({constrained(case, case.constraints[int(place[1])])})"
+
+
+def _fitted(case: Case, found: Robust) -> str:
     assert found.check is not None
+    interval = f"{found.check.low:.6g} to {found.check.high:.6g}"
     return (
-        f"{found.name} is {found.value:.6g} over its own sample, better than the interval {found.check.low:.6g} to "
-        f"{found.check.high:.6g} of the fresh one: the design fits its sample; take a larger uncertainty.sample"
+        f"{told(case, found.name)} is {found.value:.6g} over its own sample, better than the interval {interval} "
+        "of the fresh one: the design fits its sample; take a larger uncertainty.sample"
     )
 
 

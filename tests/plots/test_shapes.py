@@ -65,8 +65,12 @@ def test_a_link_between_two_points_is_drawn() -> None:
 
 
 def test_an_outline_is_drawn_instead() -> None:
-    van, wheel = shapes("van", ", outline: [{rectangle: {size: [3, 2]}}, {circle: {radius: 0.3}}]")
+    van, wheel, reaching = shapes("van", ", outline: [{rectangle: {size: [3, 2]}}, {circle: {radius: 0.3}}]")
     assert [len(area) for area in (*van.areas, *wheel.areas)] == [4, 64]
+    # an anchor above the roof hangs on it; those inside and on the border are seen as they are
+    (arm,) = reaching.arms
+    assert arm.tolist() == [[0.0, 1.0], [0.0, 1.6]]
+    assert not reaching.areas
 
 
 def test_lines_follow_evenly_spaced_points() -> None:

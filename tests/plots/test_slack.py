@@ -7,7 +7,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.scenery import start_state
 from mdstopo.plots.slack import member_lines, spare_length
-from mdstopo.plots.symbol_marks import _all_of, draw_symbols
+from mdstopo.plots.symbol_marks import _all_of, draw_marks, marks_at
 from mdstopo.plots.symbols import symbols
 
 BELT = """
@@ -98,7 +98,8 @@ def test_the_legend_shows_a_symbol_as_it_is_where_the_view_has_it_end_on() -> No
     axis = Figure().subplots()
     case = read_case(BELT.replace(", angular_velocity: 3", "").replace("LAW", "gap: 0").replace(
         "MOTION", "x: {velocity: 0}"))  # fmt: skip
-    draw_symbols(axis, case, symbols(case), start_state(case), lambda places: np.zeros((len(places), 2)))
+    end_on = marks_at(case, symbols(case), start_state(case), lambda places: np.zeros((len(places), 2)), 1.0)
+    draw_marks(axis, end_on)
     (handle,), (label,) = axis.get_legend_handles_labels()
     assert label == "held coordinate"
     assert np.array_equal(handle.get_marker().vertices, _all_of(glyphs()["held"]).vertices)

@@ -2,14 +2,17 @@
 them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import mdstopo
 from mdstopo.cli.gradient_numbers import differences
+from mdstopo.cli.output import Output
+from mdstopo.cli.uncertain_numbers import say_result
 from mdstopo.evaluators import evaluator_of
-from tests.robust.scenes import read, uncertain
+from tests.robust.scenes import read, text, uncertain
 
 REACH = {"response": {"displacement": {"body": "torso", "relative_to": "vehicle"}}, "over_time": "max"}
 #: a member whose law has a kink in its force, so that the general kernels see events too
@@ -140,3 +143,21 @@ def test_members_that_switch_and_compete_have_exact_gradients_too():
     members_ = np.array([3, case.n_design - 1])
     found = differences(lambda x: exact.evaluate(x, gradient=False).objectives, alpha, members_)["F"]
     assert np.abs(gradient[members_] - found).max() < 1e-6 * np.abs(gradient).max()
+
+
+def test_what_is_told_of_a_constraint_says_what_it_bounds(capsys):
+    section = uncertain({"measure": "mean"}, sample=6)
+    stated = text(section, constraints=[{"volume": "all", "limit": 30}, {**REACH, "limit": 0.2}])
+    names, numbers = ("G", "constraints[1]"), np.ones(2)
+    parts = {"uncertainty": {"robust": numbers, "nominal": numbers}, "uncertainty/validation": {}}
+    view = SimpleNamespace(
+        arrays={"uncertainty/robust": numbers}, under=parts.__getitem__, array=lambda place: np.ones(6),
+        lines=lambda place: names if place.endswith("results") else ("mean", "worst"),
+        case_text=stated, case_path=None, settings={}, kind="simulate",
+    )  # fmt: skip
+    say_result(Output(), view)
+    said = capsys.readouterr().out
+    assert "constraints[1] (max displacement of torso relative to vehicle" in said
+    view.case_text = "include: gone.yaml"
+    say_result(Output(), view)  # a case that cannot be read any more
+    assert "constraints[1]  " in capsys.readouterr().out

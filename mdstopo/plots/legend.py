@@ -1,0 +1,50 @@
+"""Legends of layouts: what they name, and how many columns they have room for."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.model import Case
+from mdstopo.plots.glyphs import glyphs
+from mdstopo.plots.slack import belt_lengths
+from mdstopo.plots.style import MOST_NAMED
+from mdstopo.plots.symbols import symbols
+from mdstopo.plots.thickness import families
+
+#: how legends are set, in letters: the lines beside names, between these and the names, between columns
+SETTING = {"handlelength": 1.7, "handletextpad": 0.6, "columnspacing": 1.0, "alignment": "left", "borderaxespad": 0.3}
+#: inches: a name has so much beside its letters, and so much for each; a line; above the
+#: lines with a title, and without
+BESIDE, LETTER, LINE, HEAD, EDGE = 0.33, 0.058, 0.15, 0.22, 0.08
+
+
+def legend_names(case: Case, load_case: str | None = None) -> list[str]:
+    """What a layout's legend may name, about in its order."""
+    groups = dict.fromkeys(families(case))
+    names = [*["contact"] * bool(case.contacts), *(body.name for body in case.bodies)]
+    names += [f"{group}*" for group in groups] if len(groups) <= MOST_NAMED else []
+    names += ["slack"] * any(belt_lengths(case, group) is not None for group in case.members)
+    return [*names, *{glyphs()[each.kind].words: None for each in symbols(case, load_case)}]
+
+
+def columns_of(names: Sequence[str], width: float, most: int) -> int:
+    """How many columns names can have in a width in inches, at most so many; they are filled one after the other."""
+    for columns in range(min(most, len(names)), 1, -1):
+        parts = np.array_split(np.array([len(name) for name in names]), columns)
+        if sum(BESIDE + LETTER * int(part.max()) for part in parts) <= width:
+            return columns
+    return 1
+
+
+def height_of(count: int, columns: int, title: str | None) -> float:
+    """Inches that a legend of so many names in so many columns takes, with its title where it has one."""
+    return (HEAD if title else EDGE) + LINE * -(-count // columns)
+
+
+def legend_handles(axis: Any) -> tuple[list[Any], list[str]]:
+    """The entries of a legend, those of symbols last."""
+    handles, labels = axis.get_legend_handles_labels()
+    words = {glyph.words for glyph in glyphs().values()}
+    order = sorted(range(len(labels)), key=lambda k: labels[k] in words)
+    return [handles[k] for k in order], [labels[k] for k in order]

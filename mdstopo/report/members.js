@@ -1,0 +1,35 @@
+"use strict";
+// Members as the pictures of `mdstopo plot` draw them (plots/slack.py, plots/beside.py).
+
+// Corners of a member between two places, and whether it is slack. belt: how long it is as a belt, or null; one that is
+// longer than its ends are apart hangs down as a parabola.
+const memberLine = (hang, p, q, belt) => {
+  const apart = Math.hypot(...p.map((x, k) => q[k] - x)), spare = belt === null ? 0 : belt - apart;
+  if (!(spare > hang.slack * belt)) return { line: [p, q], slack: false };
+  const deep = Math.min(Math.sqrt(0.375 * apart * spare), hang.deepest * apart);
+  const line = Array.from({ length: hang.corners }, (_, i) => {
+    const s = i / (hang.corners - 1), depth = 4 * deep * s * (1 - s);
+    return p.map((x, k) => (1 - s) * x + s * q[k] + depth * hang.down[k]);
+  });
+  return { line, slack: true };
+};
+// corners on the screen, shifted to the left of the way from the first to the last
+const shifted = (line, pixels) => {
+  const [a, b] = [line[0], line[line.length - 1]], dx = b[0] - a[0], dy = b[1] - a[1], long = Math.hypot(dx, dy);
+  return pixels && long ? line.map((p) => [p[0] + pixels * dy / long, p[1] - pixels * dx / long]) : line;
+};
+// a member on the screen; a slack one is thin and dashed
+const strokeMember = (g, line, width, slack) => {
+  g.lineWidth = slack ? 0.5 * width : width;
+  if (slack && g.setLineDash) g.setLineDash([4, 3]);
+  g.beginPath();
+  line.forEach((p, k) => (k ? g.lineTo(p[0], p[1]) : g.moveTo(p[0], p[1])));
+  g.stroke();
+  if (slack && g.setLineDash) g.setLineDash([]);
+};
+// What is looked at: all places, or those of candidates and moving bodies where the rest would make these small.
+const lookedAt = (inner, all, far) => {
+  const size = (places) => (places.length ? Math.max(...places[0].map((_, k) => { let low = Infinity, high = -Infinity; for (const p of places) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); } return high - low; })) : 0);
+  const own = size(inner);
+  return own > 0 && size(all) > far * own ? inner : all;
+};

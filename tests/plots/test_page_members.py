@@ -1,0 +1,71 @@
+"""The page draws members where pictures do: slack belts hang alike, members of the same ends lie beside each other."""
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdstopo.case.reader import read_case
+from mdstopo.plots.beside import sideways
+from mdstopo.plots.scenery import start_state
+from mdstopo.plots.slack import CORNERS, DEEPEST, SLACK, belt_lengths, down, member_lines
+from mdstopo.report import report_content
+
+NODE = shutil.which("node")
+MEMBERS = Path(report_content.__file__).with_name("members.js")
+CASE = """
+format: 1
+gravity: [3, -9.8]
+time: {end: 1}
+bodies: {a: {mass: 1, inertia: 1, position: [1, 0]}}
+points:
+  posts: {body: ground, grid: {list: [[0, 0], [0.2, 0.5], [0.5, 0]]}}
+members:
+  slack: {from: posts, to: {body: a, at: [1, 0]}, law: {type: gap, stiffness: 5, gap: 0.02}}
+  long: {from: posts, to: {body: a, at: [1, 0]}, law: {type: gap, stiffness: 5, free_length: 4}}
+  taut: {from: posts, to: {body: a, at: [1, 0]}, law: {type: gap, stiffness: 5, gap: 0}}
+  springs: {from: posts, to: {body: a, at: [1, 0]}, law: {type: spring, stiffness: 5}}
+"""
+
+
+def in_node(script: str) -> object:
+    assert NODE is not None
+    text = MEMBERS.read_text() + f"\nprocess.stdout.write(JSON.stringify({script}));"
+    return json.loads(subprocess.run([NODE, "-e", text], capture_output=True, text=True, check=True, timeout=60).stdout)
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+def test_belts_hang_on_the_page_as_in_pictures() -> None:
+    case = read_case(CASE)
+    hang = json.dumps({"slack": SLACK, "deepest": DEEPEST, "corners": CORNERS, "down": down(case).tolist()})
+    calls, expected = [], []
+    for group in case.members:
+        belts = belt_lengths(case, group)
+        lines, slack = member_lines(case, group, start_state(case), lambda places: places, np.arange(len(group)))
+        for k, (line, hangs) in enumerate(zip(lines, slack.tolist(), strict=True)):
+            p, q = line[0].tolist(), line[-1].tolist()
+            calls.append(f"memberLine({hang}, {p}, {q}, {'null' if belts is None else float(belts[k])})")
+            expected.append((line if hangs else line[[0, -1]], hangs))
+    found = in_node(f"[{', '.join(calls)}]")
+    assert [each["slack"] for each in found] == [hangs for _, hangs in expected]
+    assert sum(hangs for _, hangs in expected) == 6
+    for each, (line, _) in zip(found, expected, strict=True):
+        assert np.array(each["line"]) == pytest.approx(line, abs=1e-12)
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+def test_members_are_shifted_on_the_page_to_the_side_that_pictures_choose() -> None:
+    line = np.array([[1.0, 2.0], [4.0, 6.0]])
+    on_screen = line * [1.0, -1.0]  # down is positive there
+    found = np.array(in_node(f"shifted({on_screen.tolist()}, 2.5)")) * [1.0, -1.0]
+    assert found - line == pytest.approx(np.repeat(2.5 * sideways(line[None], np.ones(1)), 2, axis=0))
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+def test_what_is_far_off_is_left_out_of_the_page_where_it_would_make_the_rest_small() -> None:
+    inner, all_places = "[[0, 0], [1, 1]]", "[[0, 0], [1, 1], [REACH, 0]]"
+    assert in_node(f"lookedAt({inner}, {all_places.replace('REACH', '1.9')}, 2)") == [[0, 0], [1, 1], [1.9, 0]]
+    assert in_node(f"lookedAt({inner}, {all_places.replace('REACH', '30')}, 2)") == [[0, 0], [1, 1]]

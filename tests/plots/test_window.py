@@ -1,0 +1,219 @@
+"""What a picture shows is whole: symbols at its edges, members beside each other, names in the legend."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mdstopo.case.reader import read_case
+from mdstopo.plots.beside import lanes, sideways
+from mdstopo.plots.layout_plot import draw
+from mdstopo.plots.scenery import start_state
+from mdstopo.plots.symbol_marks import ground_marks, marks_at
+from mdstopo.plots.symbols import symbols
+from mdstopo.plots.views import views
+from mdstopo.plots.window import scale_of, window
+
+matplotlib = pytest.importorskip("matplotlib")
+
+#: the load is at the right edge and points out of the picture, the motion at the left one; two groups share their ends
+EDGES = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 1}
+bodies:
+  a: {mass: 1, inertia: 1, position: [0, 0]}
+  b: {mass: 1, inertia: 1, position: [4, 0.3]}
+joints: [{type: revolute, bodies: [ground, a], at: [0, 0]}]
+members:
+  belts: {from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.3]}, law: {type: spring, stiffness: 5}}
+  chains: {from: {body: b, at: [4, 0.3]}, to: {body: a, at: [0, 0]}, law: {type: spring, stiffness: 5}}
+  alone: {from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.2]}, law: {type: spring, stiffness: 5}}
+loads: [{body: b, force: [5, 1]}]
+"""
+
+
+def source_of(text: str) -> Any:
+    case = read_case(text)
+    view = SimpleNamespace(arrays={}, under=lambda place: {}, path=Path("none.h5"))
+    return SimpleNamespace(case=case, alpha=np.ones(case.n_design), view=view, load_cases=("default",))
+
+
+def boxes_of_symbols(axis: Any) -> list[Any]:
+    """Where lines with markers of their own shape are, in pixels."""
+    found = []
+    for line in axis.lines:
+        marker, places = line.get_marker(), line.get_xydata()
+        if isinstance(marker, str) or not len(places) or not line.get_clip_on():
+            continue
+        at = axis.transData.transform(places[0])
+        points = marker.vertices * axis.figure.dpi / 72.0
+        found.append((at + points.min(axis=0), at + points.max(axis=0)))
+    return found
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_symbols_at_the_edge_of_a_picture_are_whole(turned: bool) -> None:
+    from mdstopo.plots.style import styled
+
+    text = EDGES
+    if turned:  # a tall scene, with a load that points down
+        text = text.replace("[4, 0.3]", "[0.3, -4]").replace("[4, 0.2]", "[0.2, -4]").replace("[5, 1]", "[1, -5]")
+    with styled() as module:
+        figure = draw(module, source_of(text))
+        figure.canvas.draw()
+    (axis,) = figure.axes
+    seen = axis.get_window_extent()
+    boxes = boxes_of_symbols(axis)
+    assert len(boxes) >= 4
+    for low, high in boxes:
+        assert seen.x0 <= low[0] <= high[0] <= seen.x1
+        assert seen.y0 <= low[1] <= high[1] <= seen.y1
+
+
+def test_a_flat_scene_has_no_empty_space_around_it() -> None:
+    from mdstopo.plots.style import styled
+
+    with styled() as module:
+        source = source_of(EDGES)
+        flat, tall = (
+            draw(module, each).get_figheight()
+            for each in (source, source_of(EDGES.replace("[4, 0.3]", "[4, 3]").replace("[4, 0.2]", "[4, 2.9]")))
+        )
+    assert flat < tall - 0.5
+
+
+def test_a_window_has_one_scale_and_room_for_what_is_drawn() -> None:
+    case = read_case(EDGES)
+    marks = marks_at(case, symbols(case), start_state(case), lambda places: places, 4.0)
+    cloud, inches = np.array([[0.0, 0.0], [4.0, 0.3]]), np.array([3.0, 2.0])
+    low, high = window(cloud, marks, inches)
+    scale = scale_of(low, high, inches)
+    assert scale == pytest.approx(72.0 * 3.0 / (high - low)[0])
+    load = marks[-1]
+    assert load.place.tolist() == [4.0, 0.3]
+    assert high[0] - 4.0 == pytest.approx((load.reach[1, 0] + 1.5) / scale, rel=1e-3)
+    assert (low < cloud.min(axis=0)).all()
+
+
+def test_the_symbol_of_ground_lies_below_that_of_a_joint_or_a_bushing_and_nowhere_else() -> None:
+    case = read_case(EDGES)
+    marks = marks_at(case, symbols(case), start_state(case), lambda places: places, 4.0)
+    below, beside = ground_marks(np.array([[0.0, 0.0], [1.0, 1.0]]), marks, 50.0)
+    joint = marks[0]
+    assert below.reach[1, 1] < joint.reach[0, 1]
+    assert beside.below == 0.0
+
+
+def test_members_between_the_same_points_lie_beside_each_other_whichever_end_is_first() -> None:
+    case = read_case(EDGES)
+    found = lanes(case, [np.arange(len(group)) for group in case.members])
+    ways = np.array([[[0.0, 0.0], [4.0, 0.3]], [[4.0, 0.3], [0.0, 0.0]], [[0.0, 0.0], [4.0, 0.2]]])
+    shifts = sideways(ways, np.concatenate(found))
+    assert shifts[0] == pytest.approx(-shifts[1])
+    assert np.linalg.norm(shifts[0]) == pytest.approx(0.5)
+    assert shifts[0] @ (ways[0, 1] - ways[0, 0]) == pytest.approx(0.0)
+    assert not shifts[2].any()
+    alone = lanes(case, [np.arange(1), np.arange(0), np.arange(1)])  # what is not drawn takes no place
+    assert [each.tolist() for each in alone] == [[0.0], [], [0.0]]
+
+
+def test_three_members_between_the_same_points_have_the_middle_and_both_sides() -> None:
+    more = (
+        "  more: {from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.3]}, law: {type: spring, stiffness: 5}}\nloads"
+    )
+    case = read_case(EDGES.replace("loads", more))
+    found = lanes(case, [np.arange(len(group)) for group in case.members])
+    ahead = {"belts": 1.0, "chains": -1.0, "more": 1.0}
+    places = [
+        ahead[group.name] * lane[0] for group, lane in zip(case.members, found, strict=True) if group.name in ahead
+    ]
+    assert sorted(places) == [-1.0, 0.0, 1.0]
+
+
+def test_arrows_point_along_axes_that_run_backwards_in_a_view() -> None:
+    text = """
+format: 1
+dimension: 3
+gravity: [0, -9.81, 0]
+time: {end: 1}
+bodies: {a: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 0]}}
+loads: [{body: a, force: [0, 0, 5]}]
+"""
+    case = read_case(text)
+    side = views(case, np.zeros(3), 1.0)["side"]
+    (mark,) = marks_at(case, symbols(case), start_state(case), side.seen, 1.0, side.signs)
+    # to the right is what the front view sees as away: against z, for y is up
+    assert side.across.tolist() == [0.0, 0.0, -1.0]
+    assert np.cos(mark.angle) == pytest.approx(-1.0)
+
+
+def test_names_in_a_legend_are_whole() -> None:
+    from mdstopo.plots.style import styled
+
+    long = EDGES.replace("belts", "shoulder_belts_of_the_left").replace("chains", "retractors_above_the_seat")
+    with styled() as module:
+        figure = draw(module, source_of(long))
+        figure.canvas.draw()
+    (legend,), (axis,) = figure.legends, figure.axes
+    box, whole = legend.get_window_extent(), figure.bbox
+    assert box.x1 <= whole.x1
+    assert box.y1 <= whole.y1
+    assert box.y0 >= axis.get_window_extent().y1
+
+
+def test_a_moving_svg_dashes_belts_while_they_are_slack_and_shows_what_is_touched() -> None:
+    from mdstopo.plots.animation import _svg
+    from mdstopo.plots.stage import Stage
+    from mdstopo.plots.thickness import Thickness
+
+    text = EDGES.replace("  alone:", "  slack:").replace(
+        "[4, 0.2]}, law: {type: spring, stiffness: 5}", "[4, 0.2]}, law: LAW"
+    )
+    text = text.replace("LAW", "{type: gap, stiffness: 5, gap: 0.1}")
+    text += """points: {foot: {body: b, grid: {list: [[4, 0]]}}}
+contacts: [{points: foot, on: {body: ground, from: [-1, -0.4], to: [5, -0.4]}, stiffness: 1e4}]
+"""
+    source = source_of(text)
+    source.title = "belts"
+    states = np.tile(start_state(source.case), (3, 1))
+    states[1:, 3] += 0.5  # pulled taut
+    shares = Thickness(tuple(np.ones(len(group)) for group in source.case.members), "")
+    said = _svg(Stage(source, states), shares, np.linspace(0.0, 1.0, 3), states, 4.0)
+    assert said.count('attributeName="stroke-dasharray"') == 1
+    assert 'calcMode="discrete" values="4 3;none;none"' in said
+    assert "4 times slower" in said
+    assert said.count("<polyline") == 3 + len(bodies_lines(source)) + 1
+
+
+def bodies_lines(source: Any) -> list[Any]:
+    from mdstopo.plots.body_shapes import planar_shapes
+
+    shapes = [shape for name in ("a", "b", "ground") for shape in planar_shapes(source.case, name)]
+    return [line for shape in shapes for line in (*shape.areas, *shape.lines, *shape.arms)]
+
+
+def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that() -> None:
+    from mdstopo.plots.designs_plot import FIRST, SECOND, draw_pair
+    from mdstopo.plots.style import styled
+
+    text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
+    first, second = source_of(text), source_of(text)
+    names = list(first.case.group_slices)
+    first.alpha = np.array([{"belts": 1.0, "chains": 0.0, "alone": 1.0}[name] for name in names])
+    second.alpha = np.array([{"belts": 0.0, "chains": 1.0, "alone": 1.0}[name] for name in names])
+    with styled() as module:
+        figure = draw_pair(module, first, second, ("first", "second"))
+    found = []
+    for axis, own in ((figure.axes[2], FIRST), (figure.axes[3], SECOND)):
+        wanted = matplotlib.colors.to_rgba(own)
+        found.append(
+            sum(
+                len(each.get_segments())
+                for each in axis.collections
+                if len(each.get_colors()) and tuple(each.get_colors()[0]) == wanted
+            )
+        )
+    assert found == [1, 1]
