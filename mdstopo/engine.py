@@ -339,7 +339,8 @@ class Evaluator:
 
     def trajectory_with_values(self, alpha: FloatArray, load_case: str) -> tuple[Trajectory, MotionValues]:
         """The motion of one load case with the design alpha (N,), and what objectives and constraints of it come to:
-        values as of `evaluate`, from the same motion, which is computed once."""
+        values as of `evaluate`, from the same motion. It is computed once, unless integrals need steps that end
+        elsewhere, or values are those of another integrator."""
         trajectory = self.trajectory(alpha, load_case)
         aims = self._by_load_case[load_case]
         if not aims or not trajectory.status.ok:

@@ -246,7 +246,8 @@ def test_prices_are_the_gradient_of_candidates_that_are_built(name):
 
 
 def test_prices_of_curves_are_the_gradient_of_candidates_that_are_built():
-    """But for members that carry load: at stages beyond a knot at which a step ends they stay on their piece."""
+    """Exact where a member carries nothing. One that carries load stays on its piece at stages beyond the knot at which
+    a step ends, and its price does not: they differ by a part that falls with the step."""
     scene = arm(CURVE, **ENERGY)
     long, short = Priced(scene, 0.01), Priced(scene, 0.00125)
     for priced in (long, short):

@@ -262,18 +262,18 @@ class GeneralDriver:
 
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate alpha (N,) and evaluate all responses; `self.work` holds the counts of this call."""
-        code, count, time = self.run(alpha, gradient)
-        return self._evaluated(code, count, time, gradient, rows)
+        code, _, time = self.run(alpha, gradient)
+        return self._evaluated(code, time, gradient, rows)
 
     def evaluate_simulated(self) -> ResponseResult:
         """Evaluate all responses of the motion that `simulate` has computed (`SceneDriver`)."""
-        return self._evaluated(OK, self.count, self.room.item(self.count), False, USUAL)
+        return self._evaluated(OK, self.room.item(self.count), False, USUAL)
 
-    def _evaluated(self, code: int, count: int, time: float, gradient: bool, rows: Rows) -> ResponseResult:
-        """The responses of the last run.
+    def _evaluated(self, code: int, time: float, gradient: bool, rows: Rows) -> ResponseResult:
+        """The responses of the last run, of `count` steps.
 
-        code, count, time: how it ended, its number of steps, and the time that it has reached; where steps have to end
-        elsewhere for an integral, the same design is simulated again. gradient, rows: as of `evaluate`.
+        code, time: how it ended, and the time that it has reached; where steps have to end elsewhere for an integral,
+        the same design is simulated again. gradient, rows: as of `evaluate`.
         """
         if self.rows.shape[1] != (rows.most or ROWS):
             self._make_rows(rows.most or ROWS)
@@ -281,17 +281,17 @@ class GeneralDriver:
         across = self._across() if rows.cones and gradient and self._is_planar else None
         self.quadrature_breakpoints = []
         for _ in range(ROUNDS if self._integrated else 0):
-            more = quadrature_breakpoints(self, count) if code == OK else []
+            more = quadrature_breakpoints(self, self.count) if code == OK else []
             if not more:
                 break
             self.quadrature_breakpoints = self.quadrature_breakpoints + more
-            code, count, time = self.run(self._design, gradient, self.quadrature_breakpoints)
+            code, _, time = self.run(self._design, gradient, self.quadrature_breakpoints)
         self.jumps = {}
-        status, message = status_of(code), self.rotation_jump(count) if code == OK else ""
+        status, message = status_of(code), self.rotation_jump(self.count) if code == OK else ""
         if message:
             status = Status.ROTATION_JUMP
         elif code == OK:
-            self._find_rows(count, gradient, window, across)
+            self._find_rows(self.count, gradient, window, across)
             status, message = self._without_value(gradient)
         grazing, meeting = self._grazing(), self.where.item(1)
         return ResponseResult(

@@ -191,8 +191,8 @@ def most_knotted(tolerance):
     """How many members with curves may carry load for steps to end at the knots of these.
 
     Steps across knots leave the motion within the tolerance, but derivatives off by thousands of it, because stiffness
-    has kinks there. To end at each knot costs a step. The smaller the tolerance, the shorter are steps across knots, so
-    the more members it pays for.
+    has kinks there. To end at each knot costs a step. The smaller the tolerance, the shorter steps are anyway, and the
+    less an end at a knot costs.
 
     tolerance: of the case, relative.
     """
@@ -219,8 +219,8 @@ def set_modes(model, member_state, rel, rel_rate, most_curved):
     model: the compiled scene.
     member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member; the scales are read.
     rel (n_pair, POSE): relative poses; rel_rate (n_pair, D): their second derivatives in time.
-    most_curved: up to so many members with curves that carry load, each piece of their curves is a mode, so that steps
-      end at its knots (`most_knotted`). Other curves have no modes.
+    most_curved: where no more members with curves than this carry load, each piece of their curves is a mode, and steps
+      end at knots (`most_knotted`); 0: nowhere.
     """
     knots = curved_members(model, member_state) <= most_curved
     for k in range(model.block.shape[0]):

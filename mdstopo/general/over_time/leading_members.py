@@ -15,7 +15,7 @@ import numpy as np
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import KIND, MEMBER_FORCE
 from mdstopo.general.over_time.competing_members import compare, members_behind
-from mdstopo.general.over_time.piece import Piece, add_piece, apart
+from mdstopo.general.over_time.piece import Piece, add_piece, distinct_cuts
 from mdstopo.general.responses.extremes import FRACTIONS
 from mdstopo.general.responses.general_responses import TIE
 from mdstopo.general.responses.sampled_roots import roots_between
@@ -131,7 +131,7 @@ def _in_step(driver: DriverWithRun, j: int, count: int, w: int, h: float, who: I
         for a, b in combinations(near.tolist(), 2):
             for sign in (1.0, -1.0):
                 cuts += _roots(force, rate, k, a, b, sign, exact)
-    ends = np.array([*apart(sorted(cuts)), 1.0])
+    ends = np.array([*distinct_cuts(sorted(cuts)), 1.0])
     middles = 0.5 * (ends[:-1] + ends[1:])
     # the exact forces in the middle of each piece say who leads there; mostly the whole step is one piece
     size = np.abs(exact(middles, np.arange(len(who))))

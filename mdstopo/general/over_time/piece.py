@@ -10,7 +10,7 @@ class Piece(NamedTuple):
     """The part of a step from fraction `low` to `high`.
 
     who: the member that carries the largest force in it, within its group; of an expression the sides of its switches
-    (`expressions`); -1 where nothing changes between pieces.
+    (`general/model/expressions.py`); -1 where nothing changes between pieces.
     """
 
     step: int
@@ -19,7 +19,7 @@ class Piece(NamedTuple):
     who: int
 
 
-def apart(cuts: list[float]) -> list[float]:
+def distinct_cuts(cuts: list[float]) -> list[float]:
     """Cuts, rising from 0, without those next to each other or to the end of the step."""
     kept = cuts[:1]
     for cut in cuts[1:]:

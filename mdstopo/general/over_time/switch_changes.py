@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.general.driver_interface import DriverWithRun
-from mdstopo.general.over_time.piece import Piece, add_piece, apart
+from mdstopo.general.over_time.piece import Piece, add_piece, distinct_cuts
 from mdstopo.general.responses.extremes import FRACTIONS
 from mdstopo.general.responses.general_responses import switches_of
 from mdstopo.general.responses.sampled_roots import may_vanish, roots_between
@@ -18,18 +18,18 @@ def pieces_by_sides(driver: DriverWithRun, j: int, t: FloatArray) -> list[Piece]
     places = np.column_stack([np.repeat(np.arange(count), len(fractions)), np.tile(fractions, count)]).astype(float)
     cuts = _cuts(driver, j, t, places)
     middle = np.column_stack([np.arange(count), np.full(count, 0.5)])
-    sides = driver.sample_response(j, middle, False, count, rates=False)[2][:, 2]
+    middle_sides = driver.sample_response(j, middle, False, count, rates=False)[2][:, 2]
     pieces: list[Piece] = []
     for w in range(count):
-        ends = [*apart([0.0, *sorted(cuts.get(w, []))]), 1.0]
-        who = [int(sides[w])]
+        ends = [*distinct_cuts([0.0, *sorted(cuts.get(w, []))]), 1.0]
+        sides = [int(middle_sides[w])]
         if len(ends) > 2:
             middles = 0.5 * (np.array(ends[:-1]) + np.array(ends[1:]))
             inside = np.column_stack([np.full(len(middles), float(w)), middles])
             seen = driver.sample_response(j, inside, True, count, rates=False)[2][:, 2]
-            who = [int(each) for each in seen]
-        for low, high, its_sides in zip(ends[:-1], ends[1:], who, strict=True):
-            add_piece(pieces, Piece(w, low, high, its_sides))
+            sides = [int(each) for each in seen]
+        for low, high, side in zip(ends[:-1], ends[1:], sides, strict=True):
+            add_piece(pieces, Piece(w, low, high, side))
     return pieces
 
 

@@ -49,7 +49,7 @@ def modes_at_start(model, member_state, workspace, q, v, a, lam, most_curved):
 
     Constant:
       model: the compiled scene.
-      most_curved: up to how many members with curves each piece of these is a mode (`members.set_modes`).
+      most_curved: up to how many members with curves steps end at the knots of these (`members.set_modes`).
     In place:
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       q (n_q,), v (n,): the start; driven parts are put in place.
