@@ -123,7 +123,7 @@ def _modes(law: Law) -> int:
     modes = kernels_of(type(law)).modes
     if modes is None or not may_switch(law):
         return NONE
-    return PIECES if modes.pieces else FOLLOWED
+    return FOLLOWED
 
 
 def _is_even(law: Law) -> bool:

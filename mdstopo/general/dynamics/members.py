@@ -43,9 +43,9 @@ SCALE, MODE, SET = range(3)
 
 #: share of the square of a free length that rounding may take from the square of a length at home
 SURE = 1e-12
-#: how many members with curves may carry load for steps to end at the knots of these: at tolerances down to COARSE, and
-#: by which power of the tolerance that rises below it
-KNOTTED, COARSE, RISE = 40, 1e-6, 0.25
+#: of how many members with curves steps end at the knots: of groups of up to SMALL at any tolerance; of up to KNOTTED in
+#: all at tolerances down to COARSE, and of more below it by this power of the tolerance
+SMALL, KNOTTED, COARSE, RISE = 12, 40, 1e-6, 0.25
 
 
 @kernel
@@ -188,7 +188,7 @@ def may_meet(shortest, motion):
 
 @kernel
 def most_knotted(tolerance):
-    """How many members with curves may carry load for steps to end at the knots of these.
+    """Of how many members with curves steps end at the knots.
 
     Steps across knots leave the motion within the tolerance, but derivatives off by thousands of it, because stiffness
     has kinks there. To end at each knot costs a step. The smaller the tolerance, the shorter steps are anyway, and the
@@ -201,28 +201,33 @@ def most_knotted(tolerance):
 
 @kernel
 def curved_members(model, member_state):
-    """How many members with curves carry load, each law of a member counted."""
+    """How many members have curves, and how many of these carry load; each law of a member counts."""
     curved = 0
+    loaded = 0
     for k in range(model.block.shape[0]):
         if model.block[k, CODE] == INERTER or not law_has_pieces(model.block[k, CODE]):
             continue
         lo = model.block[k, START]
+        curved += model.block[k, COUNT]
         for i in range(lo, lo + model.block[k, COUNT]):
-            curved += member_state[SCALE, i] != 0.0
-    return curved
+            loaded += member_state[SCALE, i] != 0.0
+    return curved, loaded
 
 
 @kernel
 def set_modes(model, member_state, rel, rel_rate, most_curved):
     """Set the modes and permanent sets of members and contacts in member_state as they are at the start.
 
+    Where steps end at the knots of a curve, its pieces are modes; else it has none. That is so of members that carry
+    load where there are few of these, and, for the derivatives by their alphas, of the others too where there are few
+    members with curves in all; of small groups always.
+
     model: the compiled scene.
     member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member; the scales are read.
     rel (n_pair, POSE): relative poses; rel_rate (n_pair, D): their second derivatives in time.
-    most_curved: where no more members with curves than this carry load, each piece of their curves is a mode, and steps
-      end at knots (`most_knotted`); 0: nowhere.
+    most_curved: up to how many members with curves are few (`most_knotted`); 0: steps end at no knots.
     """
-    knots = curved_members(model, member_state) <= most_curved
+    curved, loaded = curved_members(model, member_state)
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
         if code == INERTER:
@@ -230,10 +235,12 @@ def set_modes(model, member_state, rel, rel_rate, most_curved):
         r = rel[model.block[k, PAIR]]
         acc = rel_rate[model.block[k, PAIR]]
         lo = model.block[k, START]
+        small = most_curved > 0 and model.block[k, COUNT] <= SMALL
         for i in range(lo, lo + model.block[k, COUNT]):
             _, x, rate = member_motion(model, i, r)
             second = second_rate(model, i, r, acc)
-            if law_has_pieces(code) and not (knots and member_state[SCALE, i] != 0.0):
+            few = small or curved <= most_curved or (loaded <= most_curved and member_state[SCALE, i] != 0.0)
+            if law_has_pieces(code) and not few:
                 member_state[MODE, i] = 0.0
             else:
                 rest = model.member[MEMBER_FREE_LENGTH, i]
