@@ -94,9 +94,10 @@ class Stage:
             draw_marks(axis, self._marks(q, shown, scale_of(low, high, inches)))
             return
         scale = scale_of(low, high, inches)
-        free = 72.0 * float(inches[1]) / scale - (high - low)[1]  # of a flat scene, above and below
-        axis.set_xlim(low[0], high[0])
-        axis.set_ylim(low[1] - 0.5 * free, high[1] + 0.5 * free)
+        free = 72.0 * inches / scale - (high - low)  # of a flat scene above and below, of a narrow one beside it
+        first, last = low - 0.5 * free, high + 0.5 * free
+        axis.set_xlim(first[0], last[0])
+        axis.set_ylim(first[1], last[1])
         for name, length, needed in (("x", float(inches[0]), ACROSS), ("y", float(inches[1]), UP)):
             axis.locator_params(axis=name, nbins=max(1, min(MOST_TICKS, int(length / needed))))
         for each in (axis.xaxis, axis.yaxis):
