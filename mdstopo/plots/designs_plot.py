@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.model import Case
 from mdstopo.plots.beside import lanes
 from mdstopo.plots.member_lines import NARROWEST, add_lines, widest_of
 from mdstopo.plots.panels import ABOVE, BELOW, LEFT, RIGHT, add_panel, fitted
@@ -70,7 +71,7 @@ def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -
     thick = thickness(source)
     blank = Thickness(tuple(np.zeros_like(share) for share in thick.shares), "")
     stage.draw(axis, q, blank, (None, None), inches, faint=0.5)
-    named = {_plain(group.name) for group in case.members} & {_plain(group.name) for group in other.case.members}
+    named = _names(case) & _names(other.case)
     known: dict[tuple[Any, ...], float] = {}
     for key, share in _by_ends(other, named):
         known[key] = max(share, known.get(key, 0.0))
@@ -86,17 +87,23 @@ def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -
         add_lines(axis, lines[is_more], lane[is_more], widest, colors=colour, linewidths=widths, zorder=2.4)
 
 
+def _names(case: Case) -> set[str]:
+    """What groups of a case may be called in another: by their names, or without the number of a final design."""
+    return {name for group in case.members for name in (group.name, _plain(group.name))}
+
+
 def _plain(name: str) -> str:
     """The name of a group, without the number that one of a final design has, whose groups are single members."""
     return re.sub(r"_\d+$", "", name)
 
 
 def _by_ends(source: Source, named: set[str]) -> list[tuple[tuple[Any, ...], float]]:
-    """Members by bodies, ends and group, where both results have groups of that name, with their thickness."""
+    """Members by bodies, ends and group, with their thickness. A group goes by its name where both results know it
+    (`named`), so that belt_1 is not belt_2, else by its name without a number, else by none."""
     found = []
     for group, share in zip(source.case.members, thickness(source).shares, strict=True):
         ends = np.concatenate([group.from_world[group.from_index], group.to_world[group.to_index]], axis=1)
-        name = _plain(group.name) if _plain(group.name) in named else ""
+        name = next((name for name in (group.name, _plain(group.name)) if name in named), "")
         found += [
             ((name, group.body_from, group.body_to, *np.round(end, 9).tolist()), float(s))
             for end, s in zip(ends, share, strict=True)
