@@ -18,7 +18,7 @@ from mdstopo.plots.symbol_marks import Mark, draw_marks, marks_at
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.thickness import Thickness
 from mdstopo.plots.views import View, views
-from mdstopo.plots.window import AROUND, FREE, places_and_reaches, window
+from mdstopo.plots.window import AROUND, BEYOND, FREE, places_and_reaches, window
 from mdstopo.scene.point_positions import points_at
 
 #: inches: a page's width, its greatest height; left of a panel, below it, above it
@@ -102,6 +102,7 @@ def _adapted(
     """
     low, high = box
     first, last = box
+    beyond = BEYOND * max(float((high - low).max()), 1e-9)
     for _ in range(ROUNDS):
         least = LEAST * max(float((last - first).max()), 1e-9)
         extent = np.maximum(last - first, least)
@@ -117,6 +118,7 @@ def _adapted(
                 ends = np.sort(view.signs[k] * (reach[..., k] + AROUND * np.array([-1.0, 1.0])), axis=1) * room
                 first[number] = min(first[number], float((at[:, k] + ends[:, 0]).min(initial=np.inf)))
                 last[number] = max(last[number], float((at[:, k] + ends[:, 1]).max(initial=-np.inf)))
+        first, last = np.maximum(first, low - beyond), np.minimum(last, high + beyond)
     return (places, inches), (first, last), scale
 
 

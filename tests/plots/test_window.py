@@ -1,5 +1,6 @@
 """What a picture shows is whole: symbols at its edges, members beside each other, names in the legend."""
 
+import itertools
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -32,6 +33,14 @@ members:
   chains: {from: {body: b, at: [4, 0.3]}, to: {body: a, at: [0, 0]}, law: {type: spring, stiffness: 5}}
   alone: {from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.2]}, law: {type: spring, stiffness: 5}}
 loads: [{body: b, force: [5, 1]}]
+"""
+IN_SPACE = """
+format: 1
+dimension: 3
+gravity: [0, -9.81, 0]
+time: {end: 1}
+bodies: {a: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 0]}}
+loads: [{body: a, force: [0, 0, 5]}]
 """
 
 
@@ -85,6 +94,55 @@ def test_a_flat_scene_has_no_empty_space_around_it() -> None:
     assert flat < tall - 0.5
 
 
+def test_a_narrow_scene_stands_in_the_middle_and_its_numbers_do_not_touch() -> None:
+    from mdstopo.plots.style import styled
+
+    spring = "{from: {body: ground, at: [0, Y]}, to: {body: a, at: [0, 0]}, law: {type: spring, stiffness: 5}}"
+    text = f"""
+format: 1
+time: {{end: 1}}
+bodies: {{a: {{mass: 1, inertia: 1e-4, position: [0, 0]}}}}
+members:
+  upper: {spring.replace("Y", "1")}
+  lower: {spring.replace("Y", "-1")}
+"""
+    with styled() as module:
+        figure = draw(module, source_of(text))
+        figure.canvas.draw()
+    (axis,) = figure.axes
+    boxes = [label.get_window_extent() for label in axis.get_xticklabels() if label.get_text()]
+    shown = [box for box in boxes if axis.bbox.x0 <= 0.5 * (box.x0 + box.x1) <= axis.bbox.x1]
+    assert len(shown) >= 2
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(shown))
+    assert abs(sum(axis.get_xlim())) < 0.02 * np.ptp(axis.get_xlim())  # the symbol of ground is not symmetric
+    assert axis.get_window_extent().width >= 1.0 * figure.dpi
+    assert np.ptp(axis.get_xlim()) / axis.bbox.width == pytest.approx(np.ptp(axis.get_ylim()) / axis.bbox.height)
+
+
+def test_a_window_stays_near_the_scene_where_a_picture_has_no_room_for_its_symbols() -> None:
+    case = read_case(EDGES)
+    marks = marks_at(case, symbols(case), start_state(case), lambda places: places, 4.0)
+    low, high = window(np.array([[0.0, 0.0], [4.0, 0.3]]), marks, np.array([0.3, 0.3]))
+    assert (high - low).max() <= 4.0 * 4.0
+    assert (low <= 0.0).all()
+    assert (high >= [4.0, 0.3]).all()
+
+
+def test_the_views_of_space_stay_near_the_scene_where_they_have_no_room_for_their_symbols() -> None:
+    from mdstopo.plots.space_layout import _adapted
+
+    case = read_case(IN_SPACE)
+    seen = views(case, np.zeros(3), 1.0)
+    marks = {
+        name: [marks_at(case, symbols(case), start_state(case), view.seen, 1.0, view.signs)]
+        for name, view in seen.items()
+    }
+    _, (low, high), _ = _adapted(seen, (-np.ones(3), np.ones(3)), marks, 60, 0.0)
+    assert (high - low).max() <= 4.0 * 2.0
+    assert (low <= -1.0).all()
+    assert (high >= 1.0).all()
+
+
 def test_a_window_has_one_scale_and_room_for_what_is_drawn() -> None:
     case = read_case(EDGES)
     marks = marks_at(case, symbols(case), start_state(case), lambda places: places, 4.0)
@@ -134,15 +192,7 @@ def test_three_members_between_the_same_points_have_the_middle_and_both_sides() 
 
 
 def test_arrows_point_along_axes_that_run_backwards_in_a_view() -> None:
-    text = """
-format: 1
-dimension: 3
-gravity: [0, -9.81, 0]
-time: {end: 1}
-bodies: {a: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 0]}}
-loads: [{body: a, force: [0, 0, 5]}]
-"""
-    case = read_case(text)
+    case = read_case(IN_SPACE)
     side = views(case, np.zeros(3), 1.0)["side"]
     (mark,) = marks_at(case, symbols(case), start_state(case), side.seen, 1.0, side.signs)
     # to the right is what the front view sees as away: against z, for y is up
@@ -195,15 +245,21 @@ def bodies_lines(source: Any) -> list[Any]:
     return [line for shape in shapes for line in (*shape.areas, *shape.lines, *shape.arms)]
 
 
-def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that() -> None:
+@pytest.mark.parametrize("names", [("belts", "chains"), ("belt_1", "belt_2")])
+def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(names: tuple[str, str]) -> None:
     from mdstopo.plots.designs_plot import FIRST, SECOND, draw_pair
     from mdstopo.plots.style import styled
 
     text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
+    there, back = (
+        "from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.3]}",
+        "from: {body: b, at: [4, 0.3]}, to: {body: a, at: [0, 0]}",
+    )
+    text = text.replace(back, there).replace("belts:", f"{names[0]}:").replace("chains:", f"{names[1]}:")
     first, second = source_of(text), source_of(text)
-    names = list(first.case.group_slices)
-    first.alpha = np.array([{"belts": 1.0, "chains": 0.0, "alone": 1.0}[name] for name in names])
-    second.alpha = np.array([{"belts": 0.0, "chains": 1.0, "alone": 1.0}[name] for name in names])
+    groups = list(first.case.group_slices)
+    first.alpha = np.array([{names[0]: 1.0, names[1]: 0.0, "alone": 1.0}[name] for name in groups])
+    second.alpha = np.array([{names[0]: 0.0, names[1]: 1.0, "alone": 1.0}[name] for name in groups])
     with styled() as module:
         figure = draw_pair(module, first, second, ("first", "second"))
     found = []

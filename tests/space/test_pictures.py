@@ -320,7 +320,9 @@ def in_node(place: Path):
 @pytest.mark.skipif(NODE is None, reason="no node on this machine")
 def test_a_long_scene_stays_in_the_view_where_it_is_turned_from_its_end(source, tmp_path, monkeypatch):
     monkeypatch.setattr(report_content, "response_history", lambda *given: {"sway": 0.3 * given[-1]})
-    case = read_case(CASE.replace("corner: [-1.5, -1.2, 0], edges: [[3, 0, 0]", "corner: [-15, -1.2, 0], edges: [[30, 0, 0]"))
+    case = read_case(
+        CASE.replace("corner: [-1.5, -1.2, 0], edges: [[3, 0, 0]", "corner: [-15, -1.2, 0], edges: [[30, 0, 0]")
+    )
     place = tmp_path / "long.html"
     place.write_text(page(report_content.content(SimpleNamespace(**{**vars(source), "case": case}))))
     drawn = in_node(place)["seen"]["turned from the side"]
