@@ -58,8 +58,7 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
     g.globalAlpha = 0.85;
     strokes(body.lines, q, index, colour, 2.2, [], false);
     g.globalAlpha = 0.7;
-    const thin = body.lines.length || body.areas.length; // what reaches out of a shape
-    strokes(body.arms, q, index, colour, thin ? 1 : 3, thin ? [6, 4] : [], false);
+    strokes(body.arms, q, index, colour, body.thin_arms ? 1 : 3, body.thin_arms ? [6, 4] : [], false);
     strokes(body.borders, q, index, colour, 1, [5, 4], true);
     g.globalAlpha = 1; g.fillStyle = colour;
     for (const point of body.points) { const p = screen(place(index, point, q)); g.fillRect(p[0] - 1.5, p[1] - 1.5, 3, 3); }
