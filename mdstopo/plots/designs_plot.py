@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case
-from mdstopo.plots.beside import lanes
+from mdstopo.plots.beside import side_places
 from mdstopo.plots.member_lines import NARROWEST, add_lines, widest_of
 from mdstopo.plots.panels import ABOVE, BELOW, LEFT, RIGHT, add_panel, fitted
 from mdstopo.plots.scenery import start_state
@@ -26,10 +26,10 @@ HIGHEST = 2.5
 def draw(module: Any, source: Source) -> Any:
     """The design that the optimiser began with, and that of the file, at the start of the motion."""
     case, q = source.stated, start_state(source.case)
-    # points that are design variables began elsewhere; both pictures have one scale
+    # points that are design variables began elsewhere; both pictures show the same part of the paper
     pair = (source.as_stated(), source)
     stages = [Stage(each, q[None]) for each in pair]
-    stages[0].cloud = stages[1].cloud = np.concatenate([stage.cloud for stage in stages])
+    Stage.show_alike(stages)
     figure, ((left, right),), inches = _panels(module, stages, 1)
     axes, designs = (left, right), (np.asarray(case.initial), source.alpha)
     for axis, shown, stage, design, title in zip(axes, pair, stages, designs, ("start", "design"), strict=True):
@@ -79,12 +79,12 @@ def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -
     more = np.split(every, np.cumsum([len(group) for group in case.members])[:-1])
     drawn = [np.flatnonzero((rise > LEAST) | (share > FAINT)) for rise, share in zip(more, thick.shares, strict=True)]
     widest = widest_of(int((every > LEAST).sum()))
-    for group, some, lane, rise in zip(case.members, drawn, lanes(case, drawn), more, strict=True):
+    for group, some, side, rise in zip(case.members, drawn, side_places(case, drawn), more, strict=True):
         lines, _ = member_lines(case, group, q, stage.seen, some)
         is_more = rise[some] > LEAST
-        add_lines(axis, lines[~is_more], lane[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
+        add_lines(axis, lines[~is_more], side[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
         widths = NARROWEST + widest * rise[some][is_more]
-        add_lines(axis, lines[is_more], lane[is_more], widest, colors=colour, linewidths=widths, zorder=2.4)
+        add_lines(axis, lines[is_more], side[is_more], widest, colors=colour, linewidths=widths, zorder=2.4)
 
 
 def _names(case: Case) -> set[str]:

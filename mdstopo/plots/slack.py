@@ -43,7 +43,7 @@ def member_lines(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Lines (K, CORNERS, 2) of some (K,) of a group's members on the paper, and which of them are slack (K,).
 
-    The page draws the same by `memberLine` in report/glyphs.js.
+    The page draws the same by `memberLine` in report/members.js.
 
     Taut ones are straight. A slack one hangs along gravity, or down the picture without, as the parabola that is as
     long as it is: of depth h over a length L it is longer by 8 h^2 / (3 L), to leading order. seen: places (n, d) on

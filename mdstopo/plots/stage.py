@@ -40,7 +40,8 @@ class Stage:
         self.names = [*(body.name for body in self.case.bodies), GROUND]
         chosen = np.unique(np.linspace(0, len(states) - 1, STATES).astype(int)).tolist()
         self._windows: dict[tuple[float, ...], tuple[Floats, Floats]] = {}
-        self._seen = [(states[k], (load_case, times[k] if times else None)) for k in chosen]
+        self._together = [self]
+        self._states = [(states[k], (load_case, times[k] if times else None)) for k in chosen]
         if self.case.dimension == 3:
             self.solids = {name: solid(self.case, name) for name in self.names}
             cloud = scene_cloud(self.case, states, self.solids)
@@ -51,14 +52,24 @@ class Stage:
         else:
             self.cloud = planar_cloud(self.case, states)
 
+    @staticmethod
+    def show_alike(stages: "list[Stage]") -> None:
+        """Give stages one window, in which all that each of them draws is whole."""
+        for stage in stages:
+            stage._together = stages
+            stage._windows.clear()
+
     def window(self, inches: Floats) -> tuple[Floats, Floats]:
         """Lower left and upper right corner (2,) on the paper of what is seen in a picture of this size (2,)."""
         known = self._windows.get(tuple(inches.tolist()))
         if known is not None:
             return known
-        scale = scale_of(self.cloud.min(axis=0), self.cloud.max(axis=0), inches)
-        marks = [mark for q, shown in self._seen for mark in self._marks(q, shown, scale)]
-        found = window(self.cloud, marks, inches)
+        cloud = np.concatenate([stage.cloud for stage in self._together])
+        scale = scale_of(cloud.min(axis=0), cloud.max(axis=0), inches)
+        marks = [
+            mark for stage in self._together for q, shown in stage._states for mark in stage._marks(q, shown, scale)
+        ]
+        found = window(cloud, marks, inches)
         self._windows[tuple(inches.tolist())] = found
         return found
 

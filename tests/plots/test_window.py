@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.plots.beside import lanes, sideways
+from mdstopo.plots.beside import side_places, sideways
+from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.layout_plot import draw
 from mdstopo.plots.scenery import start_state
+from mdstopo.plots.stage import Stage
 from mdstopo.plots.symbol_marks import ground_marks, marks_at
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.views import views
@@ -156,25 +158,42 @@ def test_a_window_has_one_scale_and_room_for_what_is_drawn() -> None:
     assert (low < cloud.min(axis=0)).all()
 
 
+def test_two_pictures_that_are_shown_alike_have_one_window_with_the_symbols_of_both() -> None:
+    inches = np.array([3.0, 1.0])
+    both = [source_of(text) for text in (EDGES, EDGES.replace("force: [5, 1]", "force: [-5, 1], at: [0, 0]"))]
+    stages = [Stage(source, start_state(source.case)[None]) for source in both]
+    low, high = zip(*(stage.window(inches) for stage in stages), strict=True)
+    assert high[0][0] > high[1][0] + 0.1  # only the first has an arrow there
+    Stage.show_alike(stages)
+    joined = [stage.window(inches) for stage in stages]
+    np.testing.assert_array_equal(joined[0], joined[1])
+    assert (joined[0][0] <= np.min(low, axis=0) + 1e-3).all()
+    assert (joined[0][1] >= np.max(high, axis=0) - 1e-3).all()
+
+
 def test_the_symbol_of_ground_lies_below_that_of_a_joint_or_a_bushing_and_nowhere_else() -> None:
-    case = read_case(EDGES)
+    bushing = "bushings: [{bodies: [ground, b], at: [4, 0.3], stiffness: [1e5, 1e5, 200]}]\n"
+    case = read_case(EDGES + bushing)
     marks = marks_at(case, symbols(case), start_state(case), lambda places: places, 4.0)
-    below, beside = ground_marks(np.array([[0.0, 0.0], [1.0, 1.0]]), marks, 50.0)
-    joint = marks[0]
-    assert below.reach[1, 1] < joint.reach[0, 1]
+    places = np.array([[0.0, 0.0], [4.0, 0.3], [1.0, 1.0]])
+    *below, beside = ground_marks(places, marks, 50.0)
+    for kind, place, ground in zip(("revolute", "bushing"), places[:2], below, strict=True):
+        (tie,) = (mark for mark in marks if mark.glyph.words == glyphs()[kind].words)
+        assert tie.place.tolist() == place.tolist()
+        assert ground.reach[1, 1] < tie.reach[0, 1]
     assert beside.below == 0.0
 
 
 def test_members_between_the_same_points_lie_beside_each_other_whichever_end_is_first() -> None:
     case = read_case(EDGES)
-    found = lanes(case, [np.arange(len(group)) for group in case.members])
+    found = side_places(case, [np.arange(len(group)) for group in case.members])
     ways = np.array([[[0.0, 0.0], [4.0, 0.3]], [[4.0, 0.3], [0.0, 0.0]], [[0.0, 0.0], [4.0, 0.2]]])
     shifts = sideways(ways, np.concatenate(found))
     assert shifts[0] == pytest.approx(-shifts[1])
     assert np.linalg.norm(shifts[0]) == pytest.approx(0.5)
     assert shifts[0] @ (ways[0, 1] - ways[0, 0]) == pytest.approx(0.0)
     assert not shifts[2].any()
-    alone = lanes(case, [np.arange(1), np.arange(0), np.arange(1)])  # what is not drawn takes no place
+    alone = side_places(case, [np.arange(1), np.arange(0), np.arange(1)])  # what is not drawn takes no place
     assert [each.tolist() for each in alone] == [[0.0], [], [0.0]]
 
 
@@ -183,10 +202,10 @@ def test_three_members_between_the_same_points_have_the_middle_and_both_sides() 
         "  more: {from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.3]}, law: {type: spring, stiffness: 5}}\nloads"
     )
     case = read_case(EDGES.replace("loads", more))
-    found = lanes(case, [np.arange(len(group)) for group in case.members])
+    found = side_places(case, [np.arange(len(group)) for group in case.members])
     ahead = {"belts": 1.0, "chains": -1.0, "more": 1.0}
     places = [
-        ahead[group.name] * lane[0] for group, lane in zip(case.members, found, strict=True) if group.name in ahead
+        ahead[group.name] * side[0] for group, side in zip(case.members, found, strict=True) if group.name in ahead
     ]
     assert sorted(places) == [-1.0, 0.0, 1.0]
 
@@ -216,7 +235,6 @@ def test_names_in_a_legend_are_whole() -> None:
 
 def test_a_moving_svg_dashes_belts_while_they_are_slack_and_shows_what_is_touched() -> None:
     from mdstopo.plots.animation import _svg
-    from mdstopo.plots.stage import Stage
     from mdstopo.plots.thickness import Thickness
 
     text = EDGES.replace("  alone:", "  slack:").replace(
