@@ -7,15 +7,15 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.plots.beside import FREE, side_places, sideways
-from mdstopo.plots.slack import member_lines
+from mdstopo.plots.slack import THIN, member_lines
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import MOST_NAMED, colour, ink
 from mdstopo.plots.thickness import Thickness, families, strongest
 
 #: points: the widest member where there are few, where there are many, and the narrowest
 WIDEST, CROWDED, NARROWEST = 2.4, 0.4, 0.35
-#: of a slack member: its dashes, and how wide it is, as a share of a taut one
-HANGING, THIN = (0, (3.0, 2.0)), 0.5
+#: dashes of a slack member, in its widths
+HANGING = (0, (3.0, 2.0))
 #: members that are few, and that are many; those that are drawn, the strongest first
 FEW, MANY, MOST = 40, 1000, 20_000
 

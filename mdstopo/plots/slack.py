@@ -12,6 +12,8 @@ from mdstopo.plots.scenery import Floats, ends_at
 #: share of its length by which a belt is too long from which on it is drawn as slack; of the distance of its ends, how
 #: far it hangs through at most; corners of the line
 SLACK, DEEPEST, CORNERS = 1e-3, 0.3, 13
+#: how wide it is as a share of a taut one; its dashes on a screen in pixels, drawn and free
+THIN, DASHES = 0.5, (4, 3)
 
 
 def belt_lengths(case: Case, group: MemberGroup) -> Floats | None:

@@ -1,11 +1,12 @@
 "use strict";
 // The scene in space: it turns under the mouse. canvas: where it is drawn; tools: where its buttons go; data: the
 // page's; motion: the one that is shown, or nothing; load: the load case; colours: of bodies and groups; redraw: draws
-// all anew. fit: choose the window; draw: bodies at q, members (rows) in colour(row, k), at a time. What is farther is
+// all anew. fit: choose the window; draw: bodies at q, members (of a design) in colour(row, k), at a time. What is farther is
 // drawn first.
 const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const WIDTH = 760, HEIGHT = 560, g = sharpened(canvas, WIDTH, HEIGHT), glyphs = makeGlyphs(g, data.glyphs), [right, away, up] = data.upright;
   const DISTANCE = 4, SMALLEST = 0.5, GRID = "#c9c9c9", CONTACT = "#8a8a8a", AXES = ["#B22222", "#2E7D32", "#1F4FA3"]; // in radii: distance of the eye, and what fills the view at least
+  const SHARE = 9, THIN = 0.4, WIDE = 2.4; // of a row: where its thickness is; pixels of the thinnest member, and to the widest
   const VIEWS = { front: [0, 0], top: [0, 90], side: [90, 0], perspective: [32, 24] }; // degrees: turn, rise
   const camera = { turn: 0, rise: 0, zoom: 1, x: 0, y: 0, flat: false };
   let cloud = [], shift = [0, 0], low = [0, 0, 0], high = [0, 0, 0], middle = [0, 0, 0], radius = 1, scale = 1, across, along, toward;
@@ -46,12 +47,15 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     return [WIDTH / 2 + camera.x + zoom * (shift[0] + scale * x), HEIGHT / 2 + camera.y + zoom * (shift[1] + scale * y), near];
   };
 
-  const lineOf = (row, all) => memberLine(data.hang, place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)), row[12]);
+  const lineOf = ({ rows, belts }, k, all) => {
+    const row = rows[k];
+    return memberLine(data.hang, place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)), belts[k]);
+  };
 
   // one window for all frames of a motion, so that it stands still
-  const fit = (rows) => {
+  const fit = (members) => {
     const m = motion(), inner = [], every = [], fixed = data.designs.find((each) => each.members).members.fixed;
-    const frames = m ? m.q.filter((_, i) => rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
+    const frames = m ? m.q.filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
     frames.forEach((q, f) => {
       const all = seats(q);
       data.bodies.forEach((body, b) => {
@@ -60,7 +64,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
         for (const p of body.corners.concat(moves ? [[0, 0, 0]] : [])) { every.push(place(all[index], p)); if (moves) inner.push(place(all[index], p)); }
         for (const p of body.points) every.push(place(all[index], p));
       });
-      for (const row of rows) for (const p of lineOf(row, all).line) { every.push(p); if (!fixed[row[0]]) inner.push(p); }
+      members.rows.forEach((row, k) => { for (const p of lineOf(members, k, all).line) { every.push(p); if (!fixed[row[0]]) inner.push(p); } });
       for (const surface of data.surfaces) if (!surface.endless) for (const p of surface.lines.flat()) every.push(place(all[surface.body], p));
     });
     cloud = fixed.every((each) => each) ? every : lookedAt(inner, every, data.far);
@@ -121,7 +125,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const polygon = (points, colour, alpha) => { g.globalAlpha = alpha; g.fillStyle = colour; g.beginPath(); points.forEach((p, i) => (i ? g.lineTo(p[0], p[1]) : g.moveTo(p[0], p[1]))); g.closePath(); g.fill(); };
   const mean = (points) => points.reduce((a, p) => a + p[2], 0) / points.length;
 
-  const draw = (q, rows, colour, coloured, time) => {
+  const draw = (q, members, colour, coloured, time) => {
     aim();
     g.globalAlpha = 1;
     g.clearRect(0, 0, WIDTH, HEIGHT);
@@ -145,12 +149,12 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
       const flat = corners.map((p) => seen(place(all[surface.body], p)));
       for (let k = 1; k < flat.length; k++) things.push([(flat[k - 1][2] + flat[k][2]) / 2, () => line(flat[k - 1], flat[k], CONTACT, 0.8, 0.8)]);
     }
-    rows.forEach((row, k) => {
-      const { line: corners, slack } = lineOf(row, all), flat = corners.map((p) => seen(p)), near = (flat[0][2] + flat[flat.length - 1][2]) / 2;
+    members.rows.forEach((row, k) => {
+      const { line: corners, slack } = lineOf(members, k, all), shift = members.beside[k] * (THIN + WIDE + data.hang.free), flat = corners.map((p) => seen(p)), near = (flat[0][2] + flat[flat.length - 1][2]) / 2;
       const clear = 0.8 + 0.2 * Math.max(-1, Math.min(1, near / radius)); // what is farther is paler
       things.push([near, () => {
-        g.strokeStyle = colour(row, k); g.globalAlpha = clear * (coloured ? 0.95 : 0.25 + 0.7 * row[9]);
-        strokeMember(g, shifted(flat, row[11] * 3.4), 0.4 + 2.4 * row[9], slack);
+        g.strokeStyle = colour(row, k); g.globalAlpha = clear * (coloured ? 0.95 : 0.25 + 0.7 * row[SHARE]);
+        strokeMember(g, data.hang, shifted(flat, shift), THIN + WIDE * row[SHARE], slack);
       }]);
     });
     for (const symbol of symbolsAt(data, load(), time)) {
