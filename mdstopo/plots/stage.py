@@ -44,32 +44,38 @@ class Stage:
         self._states = [(states[k], (load_case, times[k] if times else None)) for k in chosen]
         if self.case.dimension == 3:
             self.solids = {name: solid(self.case, name) for name in self.names}
-            cloud = scene_cloud(self.case, states, self.solids)
-            low, high = cloud.min(axis=0), cloud.max(axis=0)
+            self._places = scene_cloud(self.case, states, self.solids)
+        else:
+            self._places = planar_cloud(self.case, states)
+        self._look_at(self._places)
+
+    def _look_at(self, places: Floats) -> None:
+        """Show so much that places (n, d) of the scene are seen, in space from an eye before their middle."""
+        self._windows.clear()
+        if self.case.dimension == 3:
+            low, high = places.min(axis=0), places.max(axis=0)
             self.radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-12)
             self.view = views(self.case, 0.5 * (low + high), self.radius)["perspective"]
-            self.cloud = self.view.seen(cloud)
-        else:
-            self.cloud = planar_cloud(self.case, states)
+        self.cloud = self.seen(places)
 
     @staticmethod
     def show_alike(stages: "list[Stage]") -> None:
-        """Give stages one window, in which all that each of them draws is whole."""
+        """Give stages one window, in space from one eye, in which all that each of them draws is whole."""
+        places = np.concatenate([stage._places for stage in stages])
         for stage in stages:
             stage._together = stages
-            stage._windows.clear()
+            stage._look_at(places)
 
     def window(self, inches: Floats) -> tuple[Floats, Floats]:
         """Lower left and upper right corner (2,) on the paper of what is seen in a picture of this size (2,)."""
         known = self._windows.get(tuple(inches.tolist()))
         if known is not None:
             return known
-        cloud = np.concatenate([stage.cloud for stage in self._together])
-        scale = scale_of(cloud.min(axis=0), cloud.max(axis=0), inches)
+        scale = scale_of(self.cloud.min(axis=0), self.cloud.max(axis=0), inches)
         marks = [
             mark for stage in self._together for q, shown in stage._states for mark in stage._marks(q, shown, scale)
         ]
-        found = window(cloud, marks, inches)
+        found = window(self.cloud, marks, inches)
         self._windows[tuple(inches.tolist())] = found
         return found
 

@@ -1,12 +1,14 @@
 "use strict";
 // The scene in space: it turns under the mouse. canvas: where it is drawn; tools: where its buttons go; data: the
 // page's; motion: the one that is shown, or nothing; load: the load case; colours: of bodies and groups; redraw: draws
-// all anew. fit: choose the window; draw: bodies at q, members (of a design) in colour(row, k), at a time. What is farther is
-// drawn first.
+// all anew. fit: choose the window; draw: bodies at q, members (of a design) in colour(row, k), at a time. What is
+// farther is drawn first.
 const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const WIDTH = 760, HEIGHT = 560, g = sharpened(canvas, WIDTH, HEIGHT), glyphs = makeGlyphs(g, data.glyphs), [right, away, up] = data.upright;
-  const DISTANCE = 4, SMALLEST = 0.5, GRID = "#c9c9c9", CONTACT = "#8a8a8a", AXES = ["#B22222", "#2E7D32", "#1F4FA3"]; // in radii: distance of the eye, and what fills the view at least
-  const SHARE = 9, THIN = 0.4, WIDE = 2.4; // of a row: where its thickness is; pixels of the thinnest member, and to the widest
+  const DISTANCE = 4, SMALLEST = 0.5; // in radii of the scene: distance of the eye; what fills the view at least
+  const GRID = "#c9c9c9", CONTACT = "#8a8a8a", AXES = ["#B22222", "#2E7D32", "#1F4FA3"];
+  const SHARE = 9; // of a row: where its thickness is
+  const THIN = 0.4, WIDE = 2.4; // pixels: the thinnest member, and by how much the widest is wider
   const VIEWS = { front: [0, 0], top: [0, 90], side: [90, 0], perspective: [32, 24] }; // degrees: turn, rise
   const camera = { turn: 0, rise: 0, zoom: 1, x: 0, y: 0, flat: false };
   let cloud = [], shift = [0, 0], low = [0, 0, 0], high = [0, 0, 0], middle = [0, 0, 0], radius = 1, scale = 1, across, along, toward;

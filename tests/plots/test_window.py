@@ -171,6 +171,17 @@ def test_two_pictures_that_are_shown_alike_have_one_window_with_the_symbols_of_b
     assert (joined[0][1] >= np.max(high, axis=0) - 1e-3).all()
 
 
+def test_two_pictures_of_space_that_are_shown_alike_have_one_eye() -> None:
+    both = [source_of(text) for text in (IN_SPACE, IN_SPACE.replace("position: [0, 0, 0]", "position: [1, 0, 0]"))]
+    stages = [Stage(source, start_state(source.case)[None]) for source in both]
+    place = np.array([[0.2, 0.1, 0.3]])
+    assert np.abs(stages[0].seen(place) - stages[1].seen(place)).max() > 0.1
+    Stage.show_alike(stages)
+    np.testing.assert_array_equal(stages[0].seen(place), stages[1].seen(place))
+    inches = np.array([3.0, 1.0])
+    np.testing.assert_array_equal(stages[0].window(inches), stages[1].window(inches))
+
+
 def test_the_symbol_of_ground_lies_below_that_of_a_joint_or_a_bushing_and_nowhere_else() -> None:
     bushing = "bushings: [{bodies: [ground, b], at: [4, 0.3], stiffness: [1e5, 1e5, 200]}]\n"
     case = read_case(EDGES + bushing)
