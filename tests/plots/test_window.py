@@ -274,23 +274,31 @@ def bodies_lines(source: Any) -> list[Any]:
     return [line for shape in shapes for line in (*shape.areas, *shape.lines, *shape.arms)]
 
 
-@pytest.mark.parametrize("names", [("belts", "chains"), ("belt_1", "belt_2")])
-def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(names: tuple[str, str]) -> None:
+@pytest.mark.parametrize(
+    ("names", "seconds"),
+    [
+        (("belts", "chains"), ("belts", "chains")),
+        (("belt_1", "belt_2"), ("belt_1", "belt_2")),
+        (("belt_1", "belt_2"), ("belt_1_0", "belt_2_0")),  # single members of a final design
+    ],
+)
+def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(
+    names: tuple[str, str], seconds: tuple[str, str]
+) -> None:
     from mdstopo.plots.designs_plot import FIRST, SECOND, draw_pair
     from mdstopo.plots.style import styled
 
     text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
-    there, back = (
-        "from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.3]}",
-        "from: {body: b, at: [4, 0.3]}, to: {body: a, at: [0, 0]}",
-    )
-    text = text.replace(back, there).replace("belts:", f"{names[0]}:").replace("chains:", f"{names[1]}:")
-    first, second = source_of(text), source_of(text)
-    groups = list(first.case.group_slices)
-    first.alpha = np.array([{names[0]: 1.0, names[1]: 0.0, "alone": 1.0}[name] for name in groups])
-    second.alpha = np.array([{names[0]: 0.0, names[1]: 1.0, "alone": 1.0}[name] for name in groups])
+    a, b = "{body: a, at: [0, 0]}", "{body: b, at: [4, 0.3]}"
+    text = text.replace(f"from: {b}, to: {a}", f"from: {a}, to: {b}")
+    both = []
+    for (one, other), sizes in ((names, (1.0, 0.0)), (seconds, (0.0, 1.0))):
+        source = source_of(text.replace("belts:", f"{one}:").replace("chains:", f"{other}:"))
+        known = {one: sizes[0], other: sizes[1], "alone": 1.0}
+        source.alpha = np.array([known[name] for name in source.case.group_slices])
+        both.append(source)
     with styled() as module:
-        figure = draw_pair(module, first, second, ("first", "second"))
+        figure = draw_pair(module, *both, ("first", "second"))
     found = []
     for axis, own in ((figure.axes[2], FIRST), (figure.axes[3], SECOND)):
         wanted = matplotlib.colors.to_rgba(own)
