@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import GROUND
-from mdstopo.plots.beside import FREE, lanes, sideways
+from mdstopo.plots.beside import FREE, side_places, sideways
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.member_lines import MOST, NARROWEST, widest_of
 from mdstopo.plots.panels import ABOVE, BELOW, LEFT, RIGHT, add_panel
 from mdstopo.plots.scenery import Floats, edge_at, start_state
-from mdstopo.plots.slack import CORNERS, belt_lengths, member_lines
+from mdstopo.plots.slack import CORNERS, DASHES, belt_lengths, member_lines
 from mdstopo.plots.source import Source
 from mdstopo.plots.stage import Stage
 from mdstopo.plots.style import WIDTH, colour, ink, paper
@@ -26,8 +25,6 @@ from mdstopo.store.store_errors import StoreError
 FORMATS = (".gif", ".mp4", ".svg")
 #: dots per inch of a frame, pixels of an SVG across, frames in a second at most
 DPI, PIXELS, RATE = 150, 720, 25
-#: dashes of a slack member in an SVG
-HANGING = "4 3"
 #: inches: a frame, and the drawing in it
 FRAME = np.array([1.3 * WIDTH, WIDTH])
 FILM = FRAME - np.array([LEFT + RIGHT, BELOW + ABOVE])
@@ -153,17 +150,18 @@ def _lines(stage: Stage, thick: Thickness, states: Floats) -> list[_Line]:
             fill = f'fill="{own}" fill-opacity="0.13"' if closed else 'fill="none"'
             found.append(_Line(f'{fill} stroke="{own}" stroke-width="{wide}" stroke-linejoin="round"', flat))
     chosen, named = strongest(thick.shares, MOST), families(case)
+    dashed = " ".join(map(str, DASHES))
     order, widest = list(dict.fromkeys(named)), 1.4 * widest_of(sum(len(each) for each in chosen))
-    every = zip(case.members, thick.shares, chosen, lanes(case, chosen), named, strict=True)
-    for group, share, some, lane, family in every:
+    every = zip(case.members, thick.shares, chosen, side_places(case, chosen), named, strict=True)
+    for group, share, some, side, family in every:
         drawn = [member_lines(case, group, q, stage.seen, some) for q in states]
         ends = slice(None) if belt_lengths(case, group) is not None else slice(None, None, CORNERS - 1)
         places, slack = np.array([line for line, _ in drawn])[:, :, ends], np.array([hangs for _, hangs in drawn])
         for i, member in enumerate(some.tolist()):
             width = NARROWEST + (widest - NARROWEST) * float(share[member])
             style = f'fill="none" stroke="{colour(order.index(family))}" stroke-width="{width:.2f}"'
-            beside = (widest + FREE) * sideways(places[:, i], np.full(len(states), lane[i]))[:, None]
-            dashes = [HANGING if hangs else "none" for hangs in slack[:, i]] if slack[:, i].any() else []
+            beside = (widest + FREE) * sideways(places[:, i], np.full(len(states), side[i]))[:, None]
+            dashes = [dashed if hangs else "none" for hangs in slack[:, i]] if slack[:, i].any() else []
             found.append(_Line(style, places[:, i], beside, dashes))
     return found
 
@@ -193,6 +191,5 @@ def _body_lines(stage: Stage, name: str) -> list[tuple[Floats, bool, float]]:
     for shape2 in planar_shapes(stage.case, name):
         found += [(np.concatenate([area, area[:1]]), True, 1.0) for area in shape2.areas]
         found += [(line, False, 2.0) for line in shape2.lines]
-        thin = shape2.lines or (name != GROUND and stage.case.body(name).outline)
-        found += [(arm, False, 1.0 if thin else 2.6) for arm in shape2.arms]
+        found += [(arm, False, 1.0 if shape2.thin_arms else 2.6) for arm in shape2.arms]
     return found

@@ -12,7 +12,7 @@ SAME = 1e-9
 FREE = 0.6
 
 
-def lanes(case: Case, chosen: list[NDArray[np.int64]]) -> list[Floats]:
+def side_places(case: Case, chosen: list[NDArray[np.int64]]) -> list[Floats]:
     """Of each group (K,): where its chosen members are drawn beside the line between their ends.
 
     0 is on the line, 1 is one step to the left of it on the way from the first end to the second. Members that alone
@@ -36,8 +36,8 @@ def lanes(case: Case, chosen: list[NDArray[np.int64]]) -> list[Floats]:
     order = np.argsort(pair, kind="stable")
     place = np.empty(len(pair))
     place[order] = np.arange(len(pair)) - np.repeat(np.cumsum(count) - count, count)
-    lane = (place - 0.5 * (count[pair] - 1)) * np.where(backwards, -1.0, 1.0)
-    return np.split(lane, np.cumsum([len(some) for some in chosen])[:-1])
+    side = (place - 0.5 * (count[pair] - 1)) * np.where(backwards, -1.0, 1.0)
+    return np.split(side, np.cumsum([len(some) for some in chosen])[:-1])
 
 
 def _ends(body: int, local: Floats) -> Floats:
@@ -45,10 +45,10 @@ def _ends(body: int, local: Floats) -> Floats:
     return np.column_stack([np.full(len(local), float(body)), local])
 
 
-def sideways(lines: Floats, lane: Floats) -> Floats:
+def sideways(lines: Floats, side: Floats) -> Floats:
     """(K, 2) by which lines (K, n, 2) on the paper are shifted, in steps: to the left of the way from their first to
     their last corner; a line that is seen end on stays."""
     way = lines[:, -1] - lines[:, 0]
     length = np.hypot(way[:, 0], way[:, 1])
     unit = way / np.where(length > 0.0, length, 1.0)[:, None]
-    return np.asarray(lane[:, None] * np.stack([-unit[:, 1], unit[:, 0]], axis=1))
+    return np.asarray(side[:, None] * np.stack([-unit[:, 1], unit[:, 0]], axis=1))

@@ -31,13 +31,15 @@ class Shape:
     """What is drawn of a body, in body coordinates. areas: closed lines (n, d), an area within another is a hole;
     lines: open; arms: two ends.
 
-    border: around points that show no shape, a closed line without an area.
+    border: around points that show no shape, a closed line without an area. thin_arms: whether arms are less than the
+    rest of the body, which has an outline or lines: they are thin and dashed.
     """
 
     areas: list[Floats] = field(default_factory=list)
     lines: list[Floats] = field(default_factory=list)
     arms: list[Floats] = field(default_factory=list)
     border: Floats | None = None
+    thin_arms: bool = False
 
 
 def planar_shapes(case: Case, body: str) -> list[Shape]:
@@ -46,7 +48,7 @@ def planar_shapes(case: Case, body: str) -> list[Shape]:
     if body != GROUND and case.body(body).outline:
         found = [Shape([each.corners[list(face)] for face in each.faces]) for each in case.body(body).outline]
         arms = _reaching(points, [area for shape in found for area in shape.areas])
-        return [*found, Shape(arms=arms)] if 0 < len(arms) <= MOST_ARMS else found
+        return [*found, Shape(arms=arms, thin_arms=True)] if 0 < len(arms) <= MOST_ARMS else found
     if body != GROUND and len(points):
         area = hull(points)
         if len(area) > 2 and not others_within(case, body, area):
@@ -104,7 +106,7 @@ def line_shape(points: Floats, grids: list[Floats]) -> Shape:
     if lines and not arms:  # a frame is joined to its centre of mass where it comes nearest
         every = np.concatenate(lines)
         arms = [np.array([origin, every[int((every**2).sum(axis=1).argmin())]])]
-    return Shape(lines=lines, arms=[arm for arm in arms if np.any(arm[1])])
+    return Shape(lines=lines, arms=[arm for arm in arms if np.any(arm[1])], thin_arms=bool(lines))
 
 
 def followed(points: Floats) -> list[Floats]:

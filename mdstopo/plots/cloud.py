@@ -7,7 +7,7 @@ import numpy as np
 from mdstopo.case.model import GROUND, Case
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.scenery import Floats, edge_at, ends_at, own_points, points_of
-from mdstopo.plots.slack import belt_lengths, member_lines
+from mdstopo.plots.slack import belt_lengths, member_lines, spare_length
 from mdstopo.plots.solids import Solid
 from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.scene.point_positions import points_at
@@ -31,15 +31,12 @@ def planar_cloud(case: Case, states: Floats) -> Floats:
             moving.append(points_at(case, name, np.concatenate(lines), states).reshape(-1, 2))
         corners = np.concatenate([own_points(case, name), *lines, *others])
         all_points.append(points_at(case, name, corners, states).reshape(-1, 2))
-    everything = np.concatenate([*all_points, *_belts(case, states)])
+    everything = np.concatenate([*all_points, *_hanging(case, states)])
     edges = [edge_at(case, contact, q) for contact in case.contacts for q in states]
     inner = everything
     if case.design_groups:
         inner = np.concatenate([_centres(case, states), *moving, *_designed(case, states)])
-    for cloud in (np.concatenate([everything, *edges]), everything):
-        if _size(cloud) <= FAR * _size(inner):
-            return cloud
-    return inner
+    return without_far(inner, np.concatenate([everything, *edges]), everything)
 
 
 def scene_cloud(case: Case, states: Floats, solids: Mapping[str, Solid]) -> Floats:
@@ -50,13 +47,23 @@ def scene_cloud(case: Case, states: Floats, solids: Mapping[str, Solid]) -> Floa
         if not each.endless:
             own[each.body] = np.concatenate([own[each.body], *each.lines])
     every = [points_at(case, name, own[name], states).reshape(-1, 3) for name in own]
-    everything = np.concatenate([*every, *_belts(case, states)])
+    everything = np.concatenate([*every, *_hanging(case, states)])
     if not case.design_groups:
         return everything
     moving = [points_at(case, name, each.corners, states) for name, each in solids.items() if name != GROUND]
     inner = [_centres(case, states), *(each.reshape(-1, 3) for each in moving), *_designed(case, states)]
     found = np.concatenate(inner)
-    return everything if _size(everything) <= FAR * _size(found) or _size(found) == 0.0 else found
+    return without_far(found, everything)
+
+
+def without_far(inner: Floats, *wholes: Floats) -> Floats:
+    """What a picture shows: the first of `wholes` (n, d) that is at most FAR times as large as what is looked at.
+
+    inner (m, d): what is looked at, which is shown alone where none is; where it is a single place, the first of
+    `wholes` is shown.
+    """
+    size = _size(inner)
+    return next((whole for whole in wholes if size == 0.0 or _size(whole) <= FAR * size), inner)
 
 
 def _size(cloud: Floats) -> float:
@@ -72,14 +79,18 @@ def _centres(case: Case, states: Floats) -> Floats:
 def _designed(case: Case, states: Floats) -> list[Floats]:
     """Ends of candidates, and where they hang through."""
     ends = [ends_at(case, group, q).reshape(-1, case.dimension) for q in states for group in case.design_groups]
-    return ends + _belts(case, states, only_design=True)
+    return ends + _hanging(case, states, only_design=True)
 
 
-def _belts(case: Case, states: Floats, only_design: bool = False) -> list[Floats]:
-    """Corners of members that may hang through."""
+def _hanging(case: Case, states: Floats, only_design: bool = False) -> list[Floats]:
+    """Corners of members that hang through; those that are taut are between their ends."""
     groups = case.design_groups if only_design else case.members
-    belts = [group for group in groups if belt_lengths(case, group) is not None]
-    lines = [
-        member_lines(case, group, q, lambda places: places, np.arange(len(group)))[0] for q in states for group in belts
-    ]
-    return [line.reshape(-1, case.dimension) for line in lines]
+    found = []
+    for group in groups:
+        if belt_lengths(case, group) is None:
+            continue
+        for q in states:
+            slack = np.flatnonzero(spare_length(case, group, q))
+            lines, _ = member_lines(case, group, q, lambda places: places, slack)
+            found.append(lines.reshape(-1, case.dimension))
+    return found

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.plots.beside import lanes
+from mdstopo.case.model import Case
+from mdstopo.plots.beside import side_places
 from mdstopo.plots.member_lines import NARROWEST, add_lines, widest_of
 from mdstopo.plots.panels import ABOVE, BELOW, LEFT, RIGHT, add_panel, fitted
 from mdstopo.plots.scenery import start_state
@@ -25,10 +26,10 @@ HIGHEST = 2.5
 def draw(module: Any, source: Source) -> Any:
     """The design that the optimiser began with, and that of the file, at the start of the motion."""
     case, q = source.stated, start_state(source.case)
-    # points that are design variables began elsewhere; both pictures have one scale
+    # points that are design variables began elsewhere; both pictures show the same part of the paper
     pair = (source.as_stated(), source)
     stages = [Stage(each, q[None]) for each in pair]
-    stages[0].cloud = stages[1].cloud = np.concatenate([stage.cloud for stage in stages])
+    Stage.show_alike(stages)
     figure, ((left, right),), inches = _panels(module, stages, 1)
     axes, designs = (left, right), (np.asarray(case.initial), source.alpha)
     for axis, shown, stage, design, title in zip(axes, pair, stages, designs, ("start", "design"), strict=True):
@@ -70,7 +71,7 @@ def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -
     thick = thickness(source)
     blank = Thickness(tuple(np.zeros_like(share) for share in thick.shares), "")
     stage.draw(axis, q, blank, (None, None), inches, faint=0.5)
-    named = {_plain(group.name) for group in case.members} & {_plain(group.name) for group in other.case.members}
+    named = _names(case) & _names(other.case)
     known: dict[tuple[Any, ...], float] = {}
     for key, share in _by_ends(other, named):
         known[key] = max(share, known.get(key, 0.0))
@@ -78,12 +79,17 @@ def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -
     more = np.split(every, np.cumsum([len(group) for group in case.members])[:-1])
     drawn = [np.flatnonzero((rise > LEAST) | (share > FAINT)) for rise, share in zip(more, thick.shares, strict=True)]
     widest = widest_of(int((every > LEAST).sum()))
-    for group, some, lane, rise in zip(case.members, drawn, lanes(case, drawn), more, strict=True):
+    for group, some, side, rise in zip(case.members, drawn, side_places(case, drawn), more, strict=True):
         lines, _ = member_lines(case, group, q, stage.seen, some)
         is_more = rise[some] > LEAST
-        add_lines(axis, lines[~is_more], lane[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
+        add_lines(axis, lines[~is_more], side[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
         widths = NARROWEST + widest * rise[some][is_more]
-        add_lines(axis, lines[is_more], lane[is_more], widest, colors=colour, linewidths=widths, zorder=2.4)
+        add_lines(axis, lines[is_more], side[is_more], widest, colors=colour, linewidths=widths, zorder=2.4)
+
+
+def _names(case: Case) -> set[str]:
+    """What groups of a case may be called in another: by their names, or without the number of a final design."""
+    return {name for group in case.members for name in (group.name, _plain(group.name))}
 
 
 def _plain(name: str) -> str:
@@ -92,11 +98,12 @@ def _plain(name: str) -> str:
 
 
 def _by_ends(source: Source, named: set[str]) -> list[tuple[tuple[Any, ...], float]]:
-    """Members by bodies, ends and group, where both results have groups of that name, with their thickness."""
+    """Members by bodies, ends and group, with their thickness. A group goes by its name where both results know it
+    (`named`), so that belt_1 is not belt_2, else by its name without a number, else by none."""
     found = []
     for group, share in zip(source.case.members, thickness(source).shares, strict=True):
         ends = np.concatenate([group.from_world[group.from_index], group.to_world[group.to_index]], axis=1)
-        name = _plain(group.name) if _plain(group.name) in named else ""
+        name = next((name for name in (group.name, _plain(group.name)) if name in named), "")
         found += [
             ((name, group.body_from, group.body_to, *np.round(end, 9).tolist()), float(s))
             for end, s in zip(ends, share, strict=True)

@@ -116,9 +116,8 @@ def _shape(axis: Any, case: Case, name: str, shape: Shape, q: Floats, own: str, 
             axis.plot(*loop.T, "-", color=own, linewidth=0.8, alpha=faint, zorder=1.8)
     for line in shape.lines:
         axis.plot(*at(line).T, "-", color=own, linewidth=1.6, alpha=0.8 * faint, solid_capstyle="round", zorder=1.8)
-    thin = shape.lines or (name != GROUND and case.body(name).outline)
     for arm in shape.arms:
-        style = {"linewidth": 0.8, "linestyle": (0, (4, 2))} if thin else {"linewidth": 2.2}
+        style = {"linewidth": 0.8, "linestyle": (0, (4, 2))} if shape.thin_arms else {"linewidth": 2.2}
         axis.plot(*at(arm).T, color=own, alpha=0.7 * faint, solid_capstyle="round", zorder=1.8, **style)
     if shape.border is not None:
         border = at(np.concatenate([shape.border, shape.border[:1]]))

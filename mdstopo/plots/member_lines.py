@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case
-from mdstopo.plots.beside import FREE, lanes, sideways
-from mdstopo.plots.slack import member_lines
+from mdstopo.plots.beside import FREE, side_places, sideways
+from mdstopo.plots.slack import THIN, member_lines
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import MOST_NAMED, colour, ink
 from mdstopo.plots.thickness import Thickness, families, strongest
 
 #: points: the widest member where there are few, where there are many, and the narrowest
 WIDEST, CROWDED, NARROWEST = 2.4, 0.4, 0.35
-#: of a slack member: its dashes, and how wide it is, as a share of a taut one
-HANGING, THIN = (0, (3.0, 2.0)), 0.5
+#: dashes of a slack member, in its widths
+HANGING = (0, (3.0, 2.0))
 #: members that are few, and that are many; those that are drawn, the strongest first
 FEW, MANY, MOST = 40, 1000, 20_000
 
@@ -35,10 +35,10 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
     named = families(case)
     order = list(dict.fromkeys(named))
     any_slack = False
-    every = zip(case.members, thick.shares, chosen, lanes(case, chosen), named, strict=True)
-    for group, share, some, lane, family in every:
+    every = zip(case.members, thick.shares, chosen, side_places(case, chosen), named, strict=True)
+    for group, share, some, side, family in every:
         rising = np.argsort(share[some])
-        some, lane = some[rising], lane[rising]
+        some, side = some[rising], side[rising]
         lines, slack = member_lines(case, group, q, seen, some)
         widths = NARROWEST + (widest - NARROWEST) * share[some]
         for hangs, style, factor in ((False, "-", 1.0), (True, HANGING, THIN)):
@@ -47,7 +47,7 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
                 continue
             corners = slice(None) if hangs else slice(None, None, lines.shape[1] - 1)
             add_lines(
-                axis, lines[own][:, corners], lane[own], widest, colors=colour(order.index(family)),
+                axis, lines[own][:, corners], side[own], widest, colors=colour(order.index(family)),
                 linewidths=factor * widths[own], alpha=0.85, linestyles=[style], zorder=2.2,
             )  # fmt: skip
         any_slack |= bool(slack.any())
@@ -59,20 +59,20 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
         axis.plot([], [], color=ink("middle"), linewidth=0.8, linestyle=HANGING, label="slack")
 
 
-def add_lines(axis: Any, lines: Floats, lane: Floats, widest: float, **style: Any) -> None:
+def add_lines(axis: Any, lines: Floats, side: Floats, widest: float, **style: Any) -> None:
     """Lines of members on the paper.
 
     axis: where they are drawn.
     lines (K, n, 2): their corners.
-    lane (K,): of `lanes`.
+    side (K,): of `side_places`.
     widest: points, the width of the widest.
     style: settings of the lines.
     """
     from matplotlib.collections import LineCollection
     from matplotlib.transforms import Affine2D
 
-    if np.any(lane):
-        shifts = (widest + FREE) * sideways(lines, lane) * _ahead(axis)
+    if np.any(side):
+        shifts = (widest + FREE) * sideways(lines, side) * _ahead(axis)
         style |= {"offsets": shifts, "offset_transform": Affine2D().scale(1.0 / 72.0) + axis.figure.dpi_scale_trans}
     axis.add_collection(LineCollection(list(lines), **style), autolim=False)
 

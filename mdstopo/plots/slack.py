@@ -12,6 +12,8 @@ from mdstopo.plots.scenery import Floats, ends_at
 #: share of its length by which a belt is too long from which on it is drawn as slack; of the distance of its ends, how
 #: far it hangs through at most; corners of the line
 SLACK, DEEPEST, CORNERS = 1e-3, 0.3, 13
+#: how wide it is as a share of a taut one; its dashes on a screen in pixels, drawn and free
+THIN, DASHES = 0.5, (4, 3)
 
 
 def belt_lengths(case: Case, group: MemberGroup) -> Floats | None:
@@ -43,7 +45,7 @@ def member_lines(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Lines (K, CORNERS, 2) of some (K,) of a group's members on the paper, and which of them are slack (K,).
 
-    The page draws the same by `memberLine` in report/glyphs.js.
+    The page draws the same by `memberLine` in report/members.js.
 
     Taut ones are straight. A slack one hangs along gravity, or down the picture without, as the parabola that is as
     long as it is: of depth h over a length L it is longer by 8 h^2 / (3 L), to leading order. seen: places (n, d) on

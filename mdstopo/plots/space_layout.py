@@ -9,6 +9,7 @@ from mdstopo.case.model import GROUND
 from mdstopo.plots.cloud import scene_cloud
 from mdstopo.plots.legend import SETTING, columns_of, height_of, legend_handles, legend_names
 from mdstopo.plots.member_lines import draw_members, legend_title
+from mdstopo.plots.panels import ABOVE, BELOW, LEFT
 from mdstopo.plots.scenery import Floats, hull
 from mdstopo.plots.solids import Solid, solid
 from mdstopo.plots.source import Source
@@ -18,12 +19,11 @@ from mdstopo.plots.symbol_marks import Mark, draw_marks, marks_at
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.thickness import Thickness
 from mdstopo.plots.views import View, views
-from mdstopo.plots.window import AROUND, FREE, places_and_reaches, window
+from mdstopo.plots.window import AROUND, BEYOND, FREE, places_and_reaches, window
 from mdstopo.scene.point_positions import points_at
 
-#: inches: a page's width, its greatest height; left of a panel, below it, above it
-PAGE, TALL = 2.0 * WIDTH, 9.0
-LEFT, BELOW, ABOVE = 0.55, 0.42, 0.22
+#: inches: a page's width, its greatest height; its right margin
+PAGE, TALL, MARGIN = 2.0 * WIDTH, 9.0, 0.1
 #: columns of a legend, at most
 COLUMNS = 6
 #: the least of a panel's sides, in the longest one's
@@ -55,7 +55,7 @@ def draw_space(
         for name, view in seen.items()
     }
     names = legend_names(case, load_case)
-    columns = columns_of(names, PAGE - 0.1, COLUMNS)
+    columns = columns_of(names, PAGE - MARGIN, COLUMNS)
     (places, inches), box, scale = _adapted(
         seen, (low, high), marks, len(panels), height_of(len(names), columns, legend_title(case, thick))
     )
@@ -102,6 +102,7 @@ def _adapted(
     """
     low, high = box
     first, last = box
+    beyond = BEYOND * max(float((high - low).max()), 1e-9)
     for _ in range(ROUNDS):
         least = LEAST * max(float((last - first).max()), 1e-9)
         extent = np.maximum(last - first, least)
@@ -117,6 +118,7 @@ def _adapted(
                 ends = np.sort(view.signs[k] * (reach[..., k] + AROUND * np.array([-1.0, 1.0])), axis=1) * room
                 first[number] = min(first[number], float((at[:, k] + ends[:, 0]).min(initial=np.inf)))
                 last[number] = max(last[number], float((at[:, k] + ends[:, 1]).max(initial=-np.inf)))
+        first, last = np.maximum(first, low - beyond), np.minimum(last, high + beyond)
     return (places, inches), (first, last), scale
 
 
@@ -135,7 +137,7 @@ def _arrange(sizes: list[float], count: int, legend: float) -> tuple[_Places, tu
         columns, rows = [across, across, away, max(across, away)], [max(away, up)] * count
         where = {"front": (0, 0), "top": (1, 0), "side": (2, 0), "perspective": (3, 0)}
     free = TALL - legend - len(rows) * (BELOW + ABOVE)
-    scale = min((PAGE - len(columns) * LEFT - 0.1) / sum(columns), max(free, 1.0) / sum(rows))
+    scale = min((PAGE - len(columns) * LEFT - MARGIN) / sum(columns), max(free, 1.0) / sum(rows))
     height = legend + len(rows) * (BELOW + ABOVE) + scale * sum(rows)
     places = []
     for k in range(count):

@@ -40,16 +40,31 @@ class Stage:
         self.names = [*(body.name for body in self.case.bodies), GROUND]
         chosen = np.unique(np.linspace(0, len(states) - 1, STATES).astype(int)).tolist()
         self._windows: dict[tuple[float, ...], tuple[Floats, Floats]] = {}
-        self._seen = [(states[k], (load_case, times[k] if times else None)) for k in chosen]
+        self._together = [self]
+        self._states = [(states[k], (load_case, times[k] if times else None)) for k in chosen]
         if self.case.dimension == 3:
             self.solids = {name: solid(self.case, name) for name in self.names}
-            cloud = scene_cloud(self.case, states, self.solids)
-            low, high = cloud.min(axis=0), cloud.max(axis=0)
+            self._places = scene_cloud(self.case, states, self.solids)
+        else:
+            self._places = planar_cloud(self.case, states)
+        self._look_at(self._places)
+
+    def _look_at(self, places: Floats) -> None:
+        """Show so much that places (n, d) of the scene are seen, in space from an eye before their middle."""
+        self._windows.clear()
+        if self.case.dimension == 3:
+            low, high = places.min(axis=0), places.max(axis=0)
             self.radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-12)
             self.view = views(self.case, 0.5 * (low + high), self.radius)["perspective"]
-            self.cloud = self.view.seen(cloud)
-        else:
-            self.cloud = planar_cloud(self.case, states)
+        self.cloud = self.seen(places)
+
+    @staticmethod
+    def show_alike(stages: "list[Stage]") -> None:
+        """Give stages one window, in space from one eye, in which all that each of them draws is whole."""
+        places = np.concatenate([stage._places for stage in stages])
+        for stage in stages:
+            stage._together = stages
+            stage._look_at(places)
 
     def window(self, inches: Floats) -> tuple[Floats, Floats]:
         """Lower left and upper right corner (2,) on the paper of what is seen in a picture of this size (2,)."""
@@ -57,7 +72,9 @@ class Stage:
         if known is not None:
             return known
         scale = scale_of(self.cloud.min(axis=0), self.cloud.max(axis=0), inches)
-        marks = [mark for q, shown in self._seen for mark in self._marks(q, shown, scale)]
+        marks = [
+            mark for stage in self._together for q, shown in stage._states for mark in stage._marks(q, shown, scale)
+        ]
         found = window(self.cloud, marks, inches)
         self._windows[tuple(inches.tolist())] = found
         return found
@@ -94,9 +111,10 @@ class Stage:
             draw_marks(axis, self._marks(q, shown, scale_of(low, high, inches)))
             return
         scale = scale_of(low, high, inches)
-        free = 72.0 * float(inches[1]) / scale - (high - low)[1]  # of a flat scene, above and below
-        axis.set_xlim(low[0], high[0])
-        axis.set_ylim(low[1] - 0.5 * free, high[1] + 0.5 * free)
+        free = 72.0 * inches / scale - (high - low)  # of a flat scene above and below, of a narrow one beside it
+        first, last = low - 0.5 * free, high + 0.5 * free
+        axis.set_xlim(first[0], last[0])
+        axis.set_ylim(first[1], last[1])
         for name, length, needed in (("x", float(inches[0]), ACROSS), ("y", float(inches[1]), UP)):
             axis.locator_params(axis=name, nbins=max(1, min(MOST_TICKS, int(length / needed))))
         for each in (axis.xaxis, axis.yaxis):

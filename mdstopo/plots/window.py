@@ -11,6 +11,9 @@ from mdstopo.plots.symbol_marks import Mark
 FREE, AROUND = 7.0, 1.5
 #: share of the size of what is seen by which a symbol may stand outside: one farther off is out of the view
 OUTSIDE = 0.5
+#: sizes of a picture by which the window reaches beyond what is seen, for symbols: in a picture that is hardly larger
+#: than they are no window shows them whole, and without an end it would grow with each round
+BEYOND = 1.5
 #: times that the window is adapted to the scale it has
 ROUNDS = 12
 
@@ -34,11 +37,13 @@ def window(cloud: Floats, marks: Sequence[Mark], inches: Floats) -> tuple[Floats
     some = ((places > low - near) & (places < high + near)).all(axis=1)
     places, reaches = places[some], reaches[some]
     first, last = low, high
+    beyond = BEYOND * 72.0 * inches / scale_of(low, high, inches)
     for _ in range(ROUNDS):
         room = 1.0 / scale_of(first, last, inches)
         ends = places[:, None] + room * (reaches + AROUND * np.array([[-1.0], [1.0]]))
         first = np.minimum(low - FREE * room, ends[:, 0].min(axis=0, initial=np.inf))
         last = np.maximum(high + FREE * room, ends[:, 1].max(axis=0, initial=-np.inf))
+        first, last = np.maximum(first, low - beyond), np.minimum(last, high + beyond)
     return first, last
 
 

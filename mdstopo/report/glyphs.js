@@ -50,6 +50,18 @@ const writeNames = (g, width, names) => {
     g.fillStyle = colour; g.fillText(name, x, y);
   }
 };
+// What is looked at: all places, or those of candidates and moving bodies where the rest would make these small
+// (plots/cloud.py).
+const lookedAt = (inner, all, far) => {
+  const extent = (places, k) => {
+    let low = Infinity, high = -Infinity;
+    for (const p of places) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); }
+    return high - low;
+  };
+  const size = (places) => (places.length ? Math.max(...places[0].map((_, k) => extent(places, k))) : 0);
+  const own = size(inner);
+  return own > 0 && size(all) > far * own ? inner : all;
+};
 // a canvas as sharp as the screen is; what draws on it counts in the pixels of the page
 const sharpened = (canvas, width, height) => {
   const ratio = Math.min(3, globalThis.devicePixelRatio || 1), g = canvas.getContext("2d");

@@ -19,17 +19,11 @@ const shifted = (line, pixels) => {
   return pixels && long ? line.map((p) => [p[0] + pixels * dy / long, p[1] - pixels * dx / long]) : line;
 };
 // a member on the screen; a slack one is thin and dashed
-const strokeMember = (g, line, width, slack) => {
-  g.lineWidth = slack ? 0.5 * width : width;
-  if (slack && g.setLineDash) g.setLineDash([4, 3]);
+const strokeMember = (g, hang, line, width, slack) => {
+  g.lineWidth = slack ? hang.thin * width : width;
+  if (slack && g.setLineDash) g.setLineDash(hang.dashes);
   g.beginPath();
   line.forEach((p, k) => (k ? g.lineTo(p[0], p[1]) : g.moveTo(p[0], p[1])));
   g.stroke();
   if (slack && g.setLineDash) g.setLineDash([]);
-};
-// What is looked at: all places, or those of candidates and moving bodies where the rest would make these small.
-const lookedAt = (inner, all, far) => {
-  const size = (places) => (places.length ? Math.max(...places[0].map((_, k) => { let low = Infinity, high = -Infinity; for (const p of places) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); } return high - low; })) : 0);
-  const own = size(inner);
-  return own > 0 && size(all) > far * own ? inner : all;
 };

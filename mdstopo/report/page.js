@@ -37,14 +37,14 @@
 
   const draw = () => {
     const q = current(), m = motion();
-    const rows = data.designs[state.design].members.rows;
+    const members = data.designs[state.design].members;
     const forces = state.colour === "force" && m && m.force ? m.force[state.frame] : null;
     const most = forces ? Math.max(1e-12, ...m.force.map((row) => row.reduce((a, f) => Math.max(a, Math.abs(f)), 0))) : 1;
-    scene.draw(q, rows, (row, k) => (forces ? shade(forces[k] / most) : COLOURS[row[0] % COLOURS.length]), Boolean(forces), m ? m.t[state.frame] : null);
+    scene.draw(q, members, (row, k) => (forces ? shade(forces[k] / most) : COLOURS[row[0] % COLOURS.length]), Boolean(forces), m ? m.t[state.frame] : null);
     text("clock", m ? `t = ${number(m.t[state.frame], 4)} s` : "at the start");
-    const shown = `${rows.length} of ${data.designs[state.design].members.all} members are thick enough to be drawn.`;
+    const shown = `${members.rows.length} of ${members.all} members are thick enough to be drawn.`;
     legend(forces ? `${shown} Orange pulls, blue pushes; up to ${number(most, 3)} N.`
-      : state.colour === "force" ? `${shown} Forces are shown for springs and gaps only.` : `${shown}${data.designs[state.design].members.what ? ` Width: ${data.designs[state.design].members.what}.` : ""}`, Boolean(forces));
+      : state.colour === "force" ? `${shown} Forces are shown for springs and gaps only.` : `${shown}${members.what ? ` Width: ${members.what}.` : ""}`, Boolean(forces));
     for (const move of cursors) move();
   };
 
@@ -269,7 +269,7 @@
     slider.value = state.frame;
     for (const [k, mark] of marks) mark.setAttribute("stroke-width", k === state.design ? 5 : 1.5);
     document.body.dataset.design = state.design;
-    scene.fit(data.designs[state.design].members.rows); responses(); parts(); draw();
+    scene.fit(data.designs[state.design].members); responses(); parts(); draw();
   };
   const show = (frame) => { state.frame = frame; at("time").value = frame; document.body.dataset.frame = frame; draw(); };
 

@@ -10,14 +10,14 @@ from mdstopo.case.model import GROUND, Case
 from mdstopo.case.responses.response_units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared, kept_iterates
-from mdstopo.plots.beside import lanes
+from mdstopo.plots.beside import FREE, side_places
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.cloud import FAR
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.objectives_over_time import response_history
 from mdstopo.plots.scenery import points_of, start_state
-from mdstopo.plots.slack import CORNERS, DEEPEST, SLACK, belt_lengths, down
+from mdstopo.plots.slack import CORNERS, DASHES, DEEPEST, SLACK, THIN, belt_lengths, down
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.surface_lines import surfaces_of
@@ -65,7 +65,8 @@ def content(source: Source) -> dict[str, Any]:
         "start": _rounded(start_state(case)),
         "symbols": _symbols(case),
         "far": FAR,
-        "hang": {"slack": SLACK, "deepest": DEEPEST, "corners": CORNERS, "down": _rounded(down(case))},
+        "hang": {"slack": SLACK, "deepest": DEEPEST, "corners": CORNERS, "down": _rounded(down(case)),
+                 "thin": THIN, "dashes": DASHES, "free": FREE * 96.0 / 72.0},
         "designs": _designs(source),
     }  # fmt: skip
     if case.dimension > 2:
@@ -143,6 +144,7 @@ def _shape(case: Case, body: str) -> dict[str, Any]:
             "areas": [[_rounded(area) for area in shape.areas] for shape in shapes if shape.areas],
             "lines": [_rounded(line) for shape in shapes for line in shape.lines],
             "arms": [_rounded(arm) for shape in shapes for arm in shape.arms],
+            "thin_arms": any(shape.thin_arms for shape in shapes),
             "borders": [_rounded(border) for border in borders],
         }
     shape = solid(case, body)
@@ -270,27 +272,32 @@ def _members(source: Source, alpha: Floats) -> tuple[dict[str, Any], Chosen]:
     """Members that are thick enough to be seen, the thickest first where there are many; and which they are.
 
     Rows of: the number of the group, of both bodies, the ends in their coordinates, the thickness, the number in the
-    group, the place beside others of the same ends (`lanes`), the length as a belt or null.
+    group. Of each row besides: the place beside others of the same ends (`side_places`), the length as a belt or null.
     """
     case = source.case
     thick = thickness(source, alpha[: case.n_design])
     index, named = _numbers(case), families(case)
     order = list(dict.fromkeys(named))
-    kept, rows = [], []
+    kept: Chosen = []
+    rows: list[list[Any]] = []
+    beside: list[float] = []
+    belts: list[float | None] = []
     strong = strongest(thick.shares, DRAWN)
-    every = zip(case.members, thick.shares, strong, lanes(case, strong), named, strict=True)
-    for group, share, chosen, lane, family in every:
+    every = zip(case.members, thick.shares, strong, side_places(case, strong), named, strict=True)
+    for group, share, chosen, side, family in every:
         kept.append((group, chosen))
-        belts = belt_lengths(case, group)
+        longest = belt_lengths(case, group)
+        beside += side.tolist()
+        belts += [None] * len(chosen) if longest is None else _rounded(longest[chosen])
         a, b = index[group.body_from], index[group.body_to]
         p, q = group.p_local[chosen], group.q_local[chosen]
         for k, i in enumerate(chosen.tolist()):
             own = [*_rounded(p[k]), *_rounded(q[k]), round(float(share[i]), 3), i]
-            beside = [float(lane[k]), None if belts is None else _rounded(belts[i])]
-            rows.append([order.index(family), a, b, *own, *beside])
+            rows.append([order.index(family), a, b, *own])
     fixed = [all(not group.design for group, each in zip(case.members, named, strict=True) if each == family)
              for family in order]  # fmt: skip
-    found = {"groups": order, "fixed": fixed, "what": thick.what, "rows": rows, "all": case.n_members}
+    found = {"groups": order, "fixed": fixed, "what": thick.what, "all": case.n_members,
+             "rows": rows, "beside": beside, "belts": belts}  # fmt: skip
     return found, kept
 
 

@@ -1,10 +1,10 @@
 "use strict";
 // The scene of a plane. canvas: where it is drawn; data: the page's; motion: the one that is shown, or nothing; load:
-// the load case; colours: of bodies and groups. fit: choose the window; draw: bodies at q, members (rows) in
+// the load case; colours: of bodies and groups. fit: choose the window; draw: bodies at q, members (of a design) in
 // colour(row, k), at a time.
 const makeScene = ({ canvas, data, motion, load, colours }) => {
   const WIDTH = 760, HEIGHT = 560, g = sharpened(canvas, WIDTH, HEIGHT), glyphs = makeGlyphs(g, data.glyphs);
-  const count = data.start.length / 3, GROUND = "#666666";
+  const count = data.start.length / 3, GROUND = "#666666", SHARE = 7; // of a row: where its thickness is
   // places: body coordinates to global ones
   const place = (body, [x, y], q) => {
     if (body >= count) return [x, y];
@@ -13,21 +13,24 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
   };
   const indexOf = (body, b) => (body.name === "ground" && b === data.bodies.length - 1 ? count : b);
 
-  const lineOf = (row, q) => memberLine(data.hang, place(row[1], row.slice(3, 5), q), place(row[2], row.slice(5, 7), q), row[10]);
+  const lineOf = ({ rows, belts }, k, q) => {
+    const row = rows[k];
+    return memberLine(data.hang, place(row[1], row.slice(3, 5), q), place(row[2], row.slice(5, 7), q), belts[k]);
+  };
 
   // one window for all frames of a motion, so that it stands still
   let view = null;
-  const fit = (rows) => {
+  const fit = (members) => {
     const low = [Infinity, Infinity], high = [-Infinity, -Infinity], inner = [], all = [];
     const m = motion(), fixed = data.designs.find((each) => each.members).members.fixed;
-    const frames = m ? m.q.filter((_, i) => rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
+    const frames = m ? m.q.filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
     for (const q of frames) {
       data.bodies.forEach((body, b) => {
         const index = indexOf(body, b), shape = body.areas.flat(2).concat(body.lines.flat()).map((p) => place(index, p, q));
         for (const p of shape.concat(body.arms.flat().concat(body.borders.flat(), body.points).map((p) => place(index, p, q)))) all.push(p);
         if (index < count) for (const p of shape.concat([place(index, [0, 0], q)])) { inner.push(p); all.push(p); }
       });
-      for (const row of rows) for (const p of lineOf(row, q).line) { all.push(p); if (!fixed[row[0]]) inner.push(p); }
+      members.rows.forEach((row, k) => { for (const p of lineOf(members, k, q).line) { all.push(p); if (!fixed[row[0]]) inner.push(p); } });
     }
     const seen = fixed.every((each) => each) ? all : lookedAt(inner, all, data.far);
     for (const p of seen) for (const k of [0, 1]) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
@@ -58,8 +61,7 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
     g.globalAlpha = 0.85;
     strokes(body.lines, q, index, colour, 2.2, [], false);
     g.globalAlpha = 0.7;
-    const thin = body.lines.length || body.areas.length; // what reaches out of a shape
-    strokes(body.arms, q, index, colour, thin ? 1 : 3, thin ? [6, 4] : [], false);
+    strokes(body.arms, q, index, colour, body.thin_arms ? 1 : 3, body.thin_arms ? [6, 4] : [], false);
     strokes(body.borders, q, index, colour, 1, [5, 4], true);
     g.globalAlpha = 1; g.fillStyle = colour;
     for (const point of body.points) { const p = screen(place(index, point, q)); g.fillRect(p[0] - 1.5, p[1] - 1.5, 3, 3); }
@@ -88,17 +90,17 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
     if (gravity[0] || gravity[1]) { glyphs.draw("gravity", [WIDTH - 24, 16], Math.atan2(gravity[1], gravity[0]), 1, false); g.fillStyle = "#222222"; g.fillText("g", WIDTH - 16, 26); }
   };
 
-  const draw = (q, rows, colour, coloured, time) => {
+  const draw = (q, members, colour, coloured, time) => {
     g.globalAlpha = 1;
     g.clearRect(0, 0, WIDTH, HEIGHT);
     bodies(q);
     contacts(q);
-    const wide = Math.max(0.8, 3.2 - 0.9 * Math.log10(Math.max(1, rows.length / 10)));
-    rows.forEach((row, k) => {
-      const { line, slack } = lineOf(row, q);
+    const thin = 0.6, wide = Math.max(0.8, 3.2 - 0.9 * Math.log10(Math.max(1, members.rows.length / 10)));
+    members.rows.forEach((row, k) => {
+      const { line, slack } = lineOf(members, k, q), shift = members.beside[k] * (thin + wide + data.hang.free);
       g.strokeStyle = colour(row, k);
-      g.globalAlpha = coloured ? 0.9 : 0.45 + 0.45 * row[7];
-      strokeMember(g, shifted(line.map(screen), row[9] * (1.4 + wide)), 0.6 + wide * row[7], slack);
+      g.globalAlpha = coloured ? 0.9 : 0.45 + 0.45 * row[SHARE];
+      strokeMember(g, data.hang, shifted(line.map(screen), shift), thin + wide * row[SHARE], slack);
     });
     for (const symbol of symbolsAt(data, load(), time)) {
       const at = place(symbol.body, symbol.at, q), o = symbol.way && place(symbol.axes, [0, 0], q), w = symbol.way && place(symbol.axes, symbol.way, q);

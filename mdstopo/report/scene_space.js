@@ -1,11 +1,14 @@
 "use strict";
 // The scene in space: it turns under the mouse. canvas: where it is drawn; tools: where its buttons go; data: the
 // page's; motion: the one that is shown, or nothing; load: the load case; colours: of bodies and groups; redraw: draws
-// all anew. fit: choose the window; draw: bodies at q, members (rows) in colour(row, k), at a time. What is farther is
-// drawn first.
+// all anew. fit: choose the window; draw: bodies at q, members (of a design) in colour(row, k), at a time. What is
+// farther is drawn first.
 const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const WIDTH = 760, HEIGHT = 560, g = sharpened(canvas, WIDTH, HEIGHT), glyphs = makeGlyphs(g, data.glyphs), [right, away, up] = data.upright;
-  const DISTANCE = 4, GRID = "#c9c9c9", CONTACT = "#8a8a8a", AXES = ["#B22222", "#2E7D32", "#1F4FA3"]; // distance of the eye in radii
+  const DISTANCE = 4, SMALLEST = 0.5; // in radii of the scene: distance of the eye; what fills the view at least
+  const GRID = "#c9c9c9", CONTACT = "#8a8a8a", AXES = ["#B22222", "#2E7D32", "#1F4FA3"];
+  const SHARE = 9; // of a row: where its thickness is
+  const THIN = 0.4, WIDE = 2.4; // pixels: the thinnest member, and by how much the widest is wider
   const VIEWS = { front: [0, 0], top: [0, 90], side: [90, 0], perspective: [32, 24] }; // degrees: turn, rise
   const camera = { turn: 0, rise: 0, zoom: 1, x: 0, y: 0, flat: false };
   let cloud = [], shift = [0, 0], low = [0, 0, 0], high = [0, 0, 0], middle = [0, 0, 0], radius = 1, scale = 1, across, along, toward;
@@ -35,19 +38,26 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const place = ([a, b, c, d], p) => [dot(a, p) + d[0], dot(b, p) + d[1], dot(c, p) + d[2]];
   const indexOf = (body, b) => (body.name === "ground" && b === data.bodies.length - 1 ? data.start.length / 7 : b);
 
+  // x to the right and y down from the middle of the scene, m, as the eye sees it, and how near it is
+  const projected = (p) => {
+    const r = sum(p, 1, middle, -1), near = dot(r, toward), s = 1 / (camera.flat ? 1 : Math.max(1 - near / (DISTANCE * radius), 0.02));
+    return [s * dot(r, across), -s * dot(r, along), near];
+  };
   // x, y on the screen and how near it is
-  const seen = (p, zoom = camera.zoom) => {
-    const r = sum(p, 1, middle, -1), near = dot(r, toward);
-    const s = scale * zoom / (camera.flat ? 1 : Math.max(1 - near / (DISTANCE * radius), 0.02));
-    return [WIDTH / 2 + zoom * shift[0] + camera.x + s * dot(r, across), HEIGHT / 2 + zoom * shift[1] + camera.y - s * dot(r, along), near];
+  const seen = (p) => {
+    const [x, y, near] = projected(p), zoom = camera.zoom;
+    return [WIDTH / 2 + camera.x + zoom * (shift[0] + scale * x), HEIGHT / 2 + camera.y + zoom * (shift[1] + scale * y), near];
   };
 
-  const lineOf = (row, all) => memberLine(data.hang, place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)), row[12]);
+  const lineOf = ({ rows, belts }, k, all) => {
+    const row = rows[k];
+    return memberLine(data.hang, place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)), belts[k]);
+  };
 
   // one window for all frames of a motion, so that it stands still
-  const fit = (rows) => {
+  const fit = (members) => {
     const m = motion(), inner = [], every = [], fixed = data.designs.find((each) => each.members).members.fixed;
-    const frames = m ? m.q.filter((_, i) => rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
+    const frames = m ? m.q.filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
     frames.forEach((q, f) => {
       const all = seats(q);
       data.bodies.forEach((body, b) => {
@@ -56,7 +66,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
         for (const p of body.corners.concat(moves ? [[0, 0, 0]] : [])) { every.push(place(all[index], p)); if (moves) inner.push(place(all[index], p)); }
         for (const p of body.points) every.push(place(all[index], p));
       });
-      for (const row of rows) for (const p of lineOf(row, all).line) { every.push(p); if (!fixed[row[0]]) inner.push(p); }
+      members.rows.forEach((row, k) => { for (const p of lineOf(members, k, all).line) { every.push(p); if (!fixed[row[0]]) inner.push(p); } });
       for (const surface of data.surfaces) if (!surface.endless) for (const p of surface.lines.flat()) every.push(place(all[surface.body], p));
     });
     cloud = fixed.every((each) => each) ? every : lookedAt(inner, every, data.far);
@@ -67,15 +77,16 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     radius = Math.max(0.5 * Math.hypot(...sum(high, 1, low, -1)), 1e-9);
     frame();
   };
-  // the scale and the place at which all is seen from where the eye is, with room for symbols and names
+  // the scale and the place at which all is seen from where the eye is, with room for symbols and names; the user's
+  // moves and zoom come on top of them. A long scene that is seen from its end is not drawn so large that it leaves the
+  // view at once as it turns.
   const frame = () => {
     aim();
-    scale = 1; shift = [0, 0];
-    const least = [Infinity, Infinity], most = [-Infinity, -Infinity], room = 46;
-    for (const p of cloud) { const s = seen(p, 1); for (const k of [0, 1]) { least[k] = Math.min(least[k], s[k]); most[k] = Math.max(most[k], s[k]); } }
     if (!cloud.length) return;
-    scale = Math.min(...[WIDTH, HEIGHT].map((whole, k) => (whole - 2 * room) / Math.max(most[k] - least[k], 0.02 * radius)));
-    shift = [0, 1].map((k) => -scale * ((least[k] + most[k]) / 2 - (k ? HEIGHT : WIDTH) / 2));
+    const least = [Infinity, Infinity], most = [-Infinity, -Infinity], room = 46;
+    for (const p of cloud) { const s = projected(p); for (const k of [0, 1]) { least[k] = Math.min(least[k], s[k]); most[k] = Math.max(most[k], s[k]); } }
+    scale = Math.min(...[WIDTH, HEIGHT].map((whole, k) => (whole - 2 * room) / Math.max(most[k] - least[k], SMALLEST * radius)));
+    shift = [0, 1].map((k) => -0.5 * scale * (least[k] + most[k]));
   };
 
   const stepOf = (length) => { const size = 10 ** Math.floor(Math.log10(length / 9)); return [1, 2, 5, 10].map((k) => k * size).find((s) => s >= length / 9 * (1 - 1e-9)); };
@@ -116,7 +127,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
   const polygon = (points, colour, alpha) => { g.globalAlpha = alpha; g.fillStyle = colour; g.beginPath(); points.forEach((p, i) => (i ? g.lineTo(p[0], p[1]) : g.moveTo(p[0], p[1]))); g.closePath(); g.fill(); };
   const mean = (points) => points.reduce((a, p) => a + p[2], 0) / points.length;
 
-  const draw = (q, rows, colour, coloured, time) => {
+  const draw = (q, members, colour, coloured, time) => {
     aim();
     g.globalAlpha = 1;
     g.clearRect(0, 0, WIDTH, HEIGHT);
@@ -140,12 +151,12 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
       const flat = corners.map((p) => seen(place(all[surface.body], p)));
       for (let k = 1; k < flat.length; k++) things.push([(flat[k - 1][2] + flat[k][2]) / 2, () => line(flat[k - 1], flat[k], CONTACT, 0.8, 0.8)]);
     }
-    rows.forEach((row, k) => {
-      const { line: corners, slack } = lineOf(row, all), flat = corners.map((p) => seen(p)), near = (flat[0][2] + flat[flat.length - 1][2]) / 2;
+    members.rows.forEach((row, k) => {
+      const { line: corners, slack } = lineOf(members, k, all), shift = members.beside[k] * (THIN + WIDE + data.hang.free), flat = corners.map((p) => seen(p)), near = (flat[0][2] + flat[flat.length - 1][2]) / 2;
       const clear = 0.8 + 0.2 * Math.max(-1, Math.min(1, near / radius)); // what is farther is paler
       things.push([near, () => {
-        g.strokeStyle = colour(row, k); g.globalAlpha = clear * (coloured ? 0.95 : 0.25 + 0.7 * row[9]);
-        strokeMember(g, shifted(flat, row[11] * 3.4), 0.4 + 2.4 * row[9], slack);
+        g.strokeStyle = colour(row, k); g.globalAlpha = clear * (coloured ? 0.95 : 0.25 + 0.7 * row[SHARE]);
+        strokeMember(g, data.hang, shifted(flat, shift), THIN + WIDE * row[SHARE], slack);
       }]);
     });
     for (const symbol of symbolsAt(data, load(), time)) {
@@ -198,13 +209,13 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     } else if (event.shiftKey || (event.buttons & 6)) { camera.x += now[0] - last[0]; camera.y += now[1] - last[1]; } else turn(now[0] - last[0], now[1] - last[1]);
     again();
   });
-  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => { fingers.delete(event.pointerId); frame(); again(); });
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(-0.0015 * event.deltaY), inside(event)); again(); }, { passive: false });
   canvas.addEventListener("dblclick", () => { look("perspective"); redraw(); });
   canvas.addEventListener("keydown", (event) => {
     const moves = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] }[event.key];
-    if (moves) turn(...moves); else if (event.key === "+" || event.key === "-") zoom(event.key === "+" ? 1.15 : 1 / 1.15, [WIDTH / 2, HEIGHT / 2]); else return;
+    if (moves) { turn(...moves); frame(); } else if (event.key === "+" || event.key === "-") zoom(event.key === "+" ? 1.15 : 1 / 1.15, [WIDTH / 2, HEIGHT / 2]); else return;
     event.preventDefault(); redraw();
   });
   for (const name of Object.keys(VIEWS)) {

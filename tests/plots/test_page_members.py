@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,12 @@ import pytest
 from mdstopo.case.reader import read_case
 from mdstopo.plots.beside import sideways
 from mdstopo.plots.scenery import start_state
-from mdstopo.plots.slack import CORNERS, DEEPEST, SLACK, belt_lengths, down, member_lines
+from mdstopo.plots.slack import CORNERS, DASHES, DEEPEST, SLACK, THIN, belt_lengths, down, member_lines
 from mdstopo.report import report_content
 
+SCENE = Path(report_content.__file__).with_name("scene_plane.js")
 NODE = shutil.which("node")
-MEMBERS = Path(report_content.__file__).with_name("members.js")
+SCRIPTS = [Path(report_content.__file__).with_name(name) for name in ("glyphs.js", "members.js")]
 CASE = """
 format: 1
 gravity: [3, -9.8]
@@ -33,7 +35,7 @@ members:
 
 def in_node(script: str) -> object:
     assert NODE is not None
-    text = MEMBERS.read_text() + f"\nprocess.stdout.write(JSON.stringify({script}));"
+    text = "".join(each.read_text() for each in SCRIPTS) + f"\nprocess.stdout.write(JSON.stringify({script}));"
     return json.loads(subprocess.run([NODE, "-e", text], capture_output=True, text=True, check=True, timeout=60).stdout)
 
 
@@ -69,3 +71,56 @@ def test_what_is_far_off_is_left_out_of_the_page_where_it_would_make_the_rest_sm
     inner, all_places = "[[0, 0], [1, 1]]", "[[0, 0], [1, 1], [REACH, 0]]"
     assert in_node(f"lookedAt({inner}, {all_places.replace('REACH', '1.9')}, 2)") == [[0, 0], [1, 1], [1.9, 0]]
     assert in_node(f"lookedAt({inner}, {all_places.replace('REACH', '30')}, 2)") == [[0, 0], [1, 1]]
+
+
+#: what a scene draws on: keeps each line with its width and dashes
+PAPER = """
+const drawn = [], own = { dash: [] };
+const g = new Proxy(own, {
+  get: (_, name) => own[name] || (() => 0), set: (_, name, value) => { own[name] = value; return true; },
+});
+Object.assign(own, {
+  beginPath() { own.path = []; }, moveTo(x, y) { own.path.push([x, y]); }, lineTo(x, y) { own.path.push([x, y]); },
+  setLineDash(dash) { own.dash = dash; },
+  stroke() { drawn.push([own.path, own.lineWidth, own.dash, own.strokeStyle]); },
+});
+"""
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+def test_a_planar_scene_of_the_page_draws_slack_belts_thin_and_members_of_the_same_ends_beside_each_other() -> None:
+    case = read_case(CASE)
+    view = SimpleNamespace(
+        arrays={}, status="done", reason="", kind="simulate", warnings=(), case_text=CASE, provenance={}, settings={},
+        path=Path("none.h5"), under=lambda place: {},
+    )  # fmt: skip
+    still = SimpleNamespace(trajectory=lambda alpha, name: SimpleNamespace(t=np.zeros(1)))
+    source = SimpleNamespace(
+        case=case, view=view, title="belts", names=(), load_cases=("default",), engine=still,
+        alpha=np.ones(case.n_design), design=np.ones(case.n_design),
+    )  # fmt: skip
+    data = report_content.content(source)
+    members = data["designs"][0]["members"]
+    groups = [members["groups"][row[0]] for row in members["rows"]]
+    lengths = {group.name: belt_lengths(case, group) for group in case.members}
+    for row, name, belt, side in zip(members["rows"], groups, members["belts"], members["beside"], strict=True):
+        assert belt == (None if lengths[name] is None else pytest.approx(lengths[name][row[8]], rel=1e-5))
+        assert abs(side) in (0.5, 1.5)  # four between each two points
+    script = f"""(() => {{ {PAPER} {SCENE.read_text()}
+      const data = {json.dumps(data)}, members = data.designs[0].members, canvas = {{ getContext: () => g }};
+      const scene = makeScene({{ canvas, data, motion: () => null, load: () => "default", colours: ["#fff"] }});
+      scene.fit(members); drawn.length = 0;
+      scene.draw(data.start, members, (row) => `member ${{row[0]}}`, false, null);
+      return drawn.filter((each) => String(each[3]).startsWith("member"));
+    }})()"""
+    found = in_node(script)
+    assert len(found) == len(groups) == 12
+    widths = {(name in ("slack", "long")): width for name, (_, width, _, _) in zip(groups, found, strict=True)}
+    assert widths[True] == pytest.approx(THIN * widths[False])
+    for name, (path, _, dash, _) in zip(groups, found, strict=True):
+        assert dash == (list(DASHES) if name in ("slack", "long") else [])
+        assert len(path) == (CORNERS if name in ("slack", "long") else 2)
+    starts = np.array([path[0] for path, *_ in found]).reshape(4, 3, 2)  # by group and post
+    apart = np.linalg.norm(np.diff(starts, axis=0), axis=2)
+    assert apart == pytest.approx(np.full((3, 3), apart[0, 0]))
+    assert apart[0, 0] > max(widths.values())

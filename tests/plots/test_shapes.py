@@ -50,6 +50,7 @@ def shapes(body: str, outline: str = "") -> list[Shape]:
 def test_a_body_around_another_is_no_triangle_through_it() -> None:
     (van,) = shapes("van")
     assert not van.areas
+    assert not van.thin_arms  # they are all there is of it
     assert sorted(arm[1].tolist() for arm in van.arms) == [[-1, 0], [0, 1.6], [1.5, 0]]
 
 
@@ -71,6 +72,7 @@ def test_an_outline_is_drawn_instead() -> None:
     (arm,) = reaching.arms
     assert arm.tolist() == [[0.0, 1.0], [0.0, 1.6]]
     assert not reaching.areas
+    assert reaching.thin_arms
 
 
 def test_lines_follow_evenly_spaced_points() -> None:

@@ -1,5 +1,6 @@
 """What a picture shows is whole: symbols at its edges, members beside each other, names in the legend."""
 
+import itertools
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,9 +9,11 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.plots.beside import lanes, sideways
+from mdstopo.plots.beside import side_places, sideways
+from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.layout_plot import draw
 from mdstopo.plots.scenery import start_state
+from mdstopo.plots.stage import Stage
 from mdstopo.plots.symbol_marks import ground_marks, marks_at
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.views import views
@@ -32,6 +35,14 @@ members:
   chains: {from: {body: b, at: [4, 0.3]}, to: {body: a, at: [0, 0]}, law: {type: spring, stiffness: 5}}
   alone: {from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.2]}, law: {type: spring, stiffness: 5}}
 loads: [{body: b, force: [5, 1]}]
+"""
+IN_SPACE = """
+format: 1
+dimension: 3
+gravity: [0, -9.81, 0]
+time: {end: 1}
+bodies: {a: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 0]}}
+loads: [{body: a, force: [0, 0, 5]}]
 """
 
 
@@ -85,6 +96,55 @@ def test_a_flat_scene_has_no_empty_space_around_it() -> None:
     assert flat < tall - 0.5
 
 
+def test_a_narrow_scene_stands_in_the_middle_and_its_numbers_do_not_touch() -> None:
+    from mdstopo.plots.style import styled
+
+    spring = "{from: {body: ground, at: [0, Y]}, to: {body: a, at: [0, 0]}, law: {type: spring, stiffness: 5}}"
+    text = f"""
+format: 1
+time: {{end: 1}}
+bodies: {{a: {{mass: 1, inertia: 1e-4, position: [0, 0]}}}}
+members:
+  upper: {spring.replace("Y", "1")}
+  lower: {spring.replace("Y", "-1")}
+"""
+    with styled() as module:
+        figure = draw(module, source_of(text))
+        figure.canvas.draw()
+    (axis,) = figure.axes
+    boxes = [label.get_window_extent() for label in axis.get_xticklabels() if label.get_text()]
+    shown = [box for box in boxes if axis.bbox.x0 <= 0.5 * (box.x0 + box.x1) <= axis.bbox.x1]
+    assert len(shown) >= 2
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(shown))
+    assert abs(sum(axis.get_xlim())) < 0.02 * np.ptp(axis.get_xlim())  # the symbol of ground is not symmetric
+    assert axis.get_window_extent().width >= 1.0 * figure.dpi
+    assert np.ptp(axis.get_xlim()) / axis.bbox.width == pytest.approx(np.ptp(axis.get_ylim()) / axis.bbox.height)
+
+
+def test_a_window_stays_near_the_scene_where_a_picture_has_no_room_for_its_symbols() -> None:
+    case = read_case(EDGES)
+    marks = marks_at(case, symbols(case), start_state(case), lambda places: places, 4.0)
+    low, high = window(np.array([[0.0, 0.0], [4.0, 0.3]]), marks, np.array([0.3, 0.3]))
+    assert (high - low).max() <= 4.0 * 4.0
+    assert (low <= 0.0).all()
+    assert (high >= [4.0, 0.3]).all()
+
+
+def test_the_views_of_space_stay_near_the_scene_where_they_have_no_room_for_their_symbols() -> None:
+    from mdstopo.plots.space_layout import _adapted
+
+    case = read_case(IN_SPACE)
+    seen = views(case, np.zeros(3), 1.0)
+    marks = {
+        name: [marks_at(case, symbols(case), start_state(case), view.seen, 1.0, view.signs)]
+        for name, view in seen.items()
+    }
+    _, (low, high), _ = _adapted(seen, (-np.ones(3), np.ones(3)), marks, 60, 0.0)
+    assert (high - low).max() <= 4.0 * 2.0
+    assert (low <= -1.0).all()
+    assert (high >= 1.0).all()
+
+
 def test_a_window_has_one_scale_and_room_for_what_is_drawn() -> None:
     case = read_case(EDGES)
     marks = marks_at(case, symbols(case), start_state(case), lambda places: places, 4.0)
@@ -98,25 +158,53 @@ def test_a_window_has_one_scale_and_room_for_what_is_drawn() -> None:
     assert (low < cloud.min(axis=0)).all()
 
 
+def test_two_pictures_that_are_shown_alike_have_one_window_with_the_symbols_of_both() -> None:
+    inches = np.array([3.0, 1.0])
+    both = [source_of(text) for text in (EDGES, EDGES.replace("force: [5, 1]", "force: [-5, 1], at: [0, 0]"))]
+    stages = [Stage(source, start_state(source.case)[None]) for source in both]
+    low, high = zip(*(stage.window(inches) for stage in stages), strict=True)
+    assert high[0][0] > high[1][0] + 0.1  # only the first has an arrow there
+    Stage.show_alike(stages)
+    joined = [stage.window(inches) for stage in stages]
+    np.testing.assert_array_equal(joined[0], joined[1])
+    assert (joined[0][0] <= np.min(low, axis=0) + 1e-3).all()
+    assert (joined[0][1] >= np.max(high, axis=0) - 1e-3).all()
+
+
+def test_two_pictures_of_space_that_are_shown_alike_have_one_eye() -> None:
+    both = [source_of(text) for text in (IN_SPACE, IN_SPACE.replace("position: [0, 0, 0]", "position: [1, 0, 0]"))]
+    stages = [Stage(source, start_state(source.case)[None]) for source in both]
+    place = np.array([[0.2, 0.1, 0.3]])
+    assert np.abs(stages[0].seen(place) - stages[1].seen(place)).max() > 0.1
+    Stage.show_alike(stages)
+    np.testing.assert_array_equal(stages[0].seen(place), stages[1].seen(place))
+    inches = np.array([3.0, 1.0])
+    np.testing.assert_array_equal(stages[0].window(inches), stages[1].window(inches))
+
+
 def test_the_symbol_of_ground_lies_below_that_of_a_joint_or_a_bushing_and_nowhere_else() -> None:
-    case = read_case(EDGES)
+    bushing = "bushings: [{bodies: [ground, b], at: [4, 0.3], stiffness: [1e5, 1e5, 200]}]\n"
+    case = read_case(EDGES + bushing)
     marks = marks_at(case, symbols(case), start_state(case), lambda places: places, 4.0)
-    below, beside = ground_marks(np.array([[0.0, 0.0], [1.0, 1.0]]), marks, 50.0)
-    joint = marks[0]
-    assert below.reach[1, 1] < joint.reach[0, 1]
+    places = np.array([[0.0, 0.0], [4.0, 0.3], [1.0, 1.0]])
+    *below, beside = ground_marks(places, marks, 50.0)
+    for kind, place, ground in zip(("revolute", "bushing"), places[:2], below, strict=True):
+        (tie,) = (mark for mark in marks if mark.glyph.words == glyphs()[kind].words)
+        assert tie.place.tolist() == place.tolist()
+        assert ground.reach[1, 1] < tie.reach[0, 1]
     assert beside.below == 0.0
 
 
 def test_members_between_the_same_points_lie_beside_each_other_whichever_end_is_first() -> None:
     case = read_case(EDGES)
-    found = lanes(case, [np.arange(len(group)) for group in case.members])
+    found = side_places(case, [np.arange(len(group)) for group in case.members])
     ways = np.array([[[0.0, 0.0], [4.0, 0.3]], [[4.0, 0.3], [0.0, 0.0]], [[0.0, 0.0], [4.0, 0.2]]])
     shifts = sideways(ways, np.concatenate(found))
     assert shifts[0] == pytest.approx(-shifts[1])
     assert np.linalg.norm(shifts[0]) == pytest.approx(0.5)
     assert shifts[0] @ (ways[0, 1] - ways[0, 0]) == pytest.approx(0.0)
     assert not shifts[2].any()
-    alone = lanes(case, [np.arange(1), np.arange(0), np.arange(1)])  # what is not drawn takes no place
+    alone = side_places(case, [np.arange(1), np.arange(0), np.arange(1)])  # what is not drawn takes no place
     assert [each.tolist() for each in alone] == [[0.0], [], [0.0]]
 
 
@@ -125,24 +213,16 @@ def test_three_members_between_the_same_points_have_the_middle_and_both_sides() 
         "  more: {from: {body: a, at: [0, 0]}, to: {body: b, at: [4, 0.3]}, law: {type: spring, stiffness: 5}}\nloads"
     )
     case = read_case(EDGES.replace("loads", more))
-    found = lanes(case, [np.arange(len(group)) for group in case.members])
+    found = side_places(case, [np.arange(len(group)) for group in case.members])
     ahead = {"belts": 1.0, "chains": -1.0, "more": 1.0}
     places = [
-        ahead[group.name] * lane[0] for group, lane in zip(case.members, found, strict=True) if group.name in ahead
+        ahead[group.name] * side[0] for group, side in zip(case.members, found, strict=True) if group.name in ahead
     ]
     assert sorted(places) == [-1.0, 0.0, 1.0]
 
 
 def test_arrows_point_along_axes_that_run_backwards_in_a_view() -> None:
-    text = """
-format: 1
-dimension: 3
-gravity: [0, -9.81, 0]
-time: {end: 1}
-bodies: {a: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 0]}}
-loads: [{body: a, force: [0, 0, 5]}]
-"""
-    case = read_case(text)
+    case = read_case(IN_SPACE)
     side = views(case, np.zeros(3), 1.0)["side"]
     (mark,) = marks_at(case, symbols(case), start_state(case), side.seen, 1.0, side.signs)
     # to the right is what the front view sees as away: against z, for y is up
@@ -166,7 +246,6 @@ def test_names_in_a_legend_are_whole() -> None:
 
 def test_a_moving_svg_dashes_belts_while_they_are_slack_and_shows_what_is_touched() -> None:
     from mdstopo.plots.animation import _svg
-    from mdstopo.plots.stage import Stage
     from mdstopo.plots.thickness import Thickness
 
     text = EDGES.replace("  alone:", "  slack:").replace(
@@ -195,17 +274,31 @@ def bodies_lines(source: Any) -> list[Any]:
     return [line for shape in shapes for line in (*shape.areas, *shape.lines, *shape.arms)]
 
 
-def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that() -> None:
+@pytest.mark.parametrize(
+    ("names", "seconds"),
+    [
+        (("belts", "chains"), ("belts", "chains")),
+        (("belt_1", "belt_2"), ("belt_1", "belt_2")),
+        (("belt_1", "belt_2"), ("belt_1_0", "belt_2_0")),  # single members of a final design
+    ],
+)
+def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(
+    names: tuple[str, str], seconds: tuple[str, str]
+) -> None:
     from mdstopo.plots.designs_plot import FIRST, SECOND, draw_pair
     from mdstopo.plots.style import styled
 
     text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
-    first, second = source_of(text), source_of(text)
-    names = list(first.case.group_slices)
-    first.alpha = np.array([{"belts": 1.0, "chains": 0.0, "alone": 1.0}[name] for name in names])
-    second.alpha = np.array([{"belts": 0.0, "chains": 1.0, "alone": 1.0}[name] for name in names])
+    a, b = "{body: a, at: [0, 0]}", "{body: b, at: [4, 0.3]}"
+    text = text.replace(f"from: {b}, to: {a}", f"from: {a}, to: {b}")
+    both = []
+    for (one, other), sizes in ((names, (1.0, 0.0)), (seconds, (0.0, 1.0))):
+        source = source_of(text.replace("belts:", f"{one}:").replace("chains:", f"{other}:"))
+        known = {one: sizes[0], other: sizes[1], "alone": 1.0}
+        source.alpha = np.array([known[name] for name in source.case.group_slices])
+        both.append(source)
     with styled() as module:
-        figure = draw_pair(module, first, second, ("first", "second"))
+        figure = draw_pair(module, *both, ("first", "second"))
     found = []
     for axis, own in ((figure.axes[2], FIRST), (figure.axes[3], SECOND)):
         wanted = matplotlib.colors.to_rgba(own)

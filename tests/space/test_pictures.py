@@ -310,16 +310,38 @@ def test_forces_in_the_page_are_those_of_the_springs(source, written):
         assert motion["force"][k] == pytest.approx(source.alpha[chosen] * 800.0 * stretch, rel=2e-3, abs=1e-3)
 
 
+def in_node(place: Path):
+    """What a page draws as it is used."""
+    script = Path(__file__).with_name("page_in_node.js")
+    done = subprocess.run([NODE, str(script), str(place)], capture_output=True, text=True, timeout=60, check=True)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+def test_a_long_scene_stays_in_the_view_where_it_is_turned_from_its_end(source, tmp_path, monkeypatch):
+    monkeypatch.setattr(report_content, "response_history", lambda *given: {"sway": 0.3 * given[-1]})
+    case = read_case(
+        CASE.replace("corner: [-1.5, -1.2, 0], edges: [[3, 0, 0]", "corner: [-15, -1.2, 0], edges: [[30, 0, 0]")
+    )
+    place = tmp_path / "long.html"
+    place.write_text(page(report_content.content(SimpleNamespace(**{**vars(source), "case": case}))))
+    drawn = in_node(place)["seen"]["turned from the side"]
+    places = np.concatenate([each["path"] for each in drawn if each["kind"] == "area"])
+    assert (places >= 0.0).all()
+    assert (places <= [760.0, 560.0]).all()
+    assert np.ptp(places[:, 0]) > 380.0
+
+
 @pytest.mark.skipif(NODE is None, reason="no node on this machine")
 def test_the_scene_turns_under_the_mouse_and_moves_with_the_slider(source, written):
-    script = Path(__file__).with_name("page_in_node.js")
-    done = subprocess.run([NODE, str(script), str(written[0])], capture_output=True, text=True, timeout=60, check=True)
-    found = json.loads(done.stdout)
+    found = in_node(written[0])
     seen = found["seen"]
     assert (found["title"], found["clock"]) == (TITLE, "t = 1 s")
     pictures = {name: json.dumps(drawn) for name, drawn in seen.items()}
     assert pictures["back"] == pictures["perspective"]
-    assert len(set(pictures.values())) == len(pictures) - 1
+    # another design or load case does not undo what the user has moved and zoomed
+    assert pictures["chosen again"] == pictures["moved"]
+    assert len(set(pictures.values())) == len(pictures) - 2
     assert all(np.isfinite(each["path"]).all() for drawn in seen.values() for each in drawn)
     case, start = source.case, start_state(source.case)
     corners = points_at(case, "hull", solid(case, "hull").corners, start[None])[0]
