@@ -83,17 +83,16 @@ FEW_AT = 2 * PLACES
 #: the last coefficients of elongations and rates from which others follow are to be below this (m, m/s), a tenth of
 #: `sorted_members.SURE`
 EXACT = 1e-12
-#: a polynomial through all nodes of a row is nowhere larger than so many times the largest value at a node (its
-#: Lebesgue constant is about 2.2, and a bit more where points of the grid are only nearly at the nodes)
-BETWEEN = 4.0
 #: of the few: how many rows they are in, the columns of the part, whether other rows follow from theirs
 FEW_NUMBERS = 3
 FEW_ROWS, PART_COLUMNS, BETWEEN_ROWS = range(FEW_NUMBERS)
+#: the places of the Lebesgue constants
+BY_ROWS, BY_COLUMNS = range(2)
 
 #: the arrays of a `FewMembers`
 FIELDS = (
-    "size", "places", "row_node", "row_weight", "row_share", "column_node", "column_weight", "column_share", "works",
-    "now", "sums", "row_motion", "box", "part_box", "row_sum", "total", "row_values", "row_mode", "sets",
+    "size", "places", "row_node", "row_weight", "row_share", "column_node", "column_weight", "column_share", "between",
+    "works", "now", "sums", "row_motion", "box", "part_box", "row_sum", "total", "row_values", "row_mode", "sets",
 )  # fmt: skip
 
 
@@ -102,9 +101,11 @@ class FewMembers:
 
     size (FEW_NUMBERS,). places (MOST_FEW,): theirs in the tile, row by row. row_node, row_weight (TALL,), column_node,
     column_weight (COLUMN_NODES,): of `fill_weights`. row_share (TALL, TALL): by how much each of their rows counts in a
-    row of the tile. column_share (COLUMN_NODES, BROAD): likewise by columns of the part. works (NODES, WORKS,
-    MOST_FEW), now (WORKS, MOST_FEW): what they do at the nodes of a step, of which the first does not count, and at a
-    stage. sums (SETS, MOST_FEW): what they would do in a step, with each of some permanent sets.
+    row of the tile. column_share (COLUMN_NODES, BROAD): likewise by columns of the part. between (2,): the Lebesgue
+    constants: by how many times what follows between rows, and between columns, may be larger than the largest of the
+    values from which it follows. works (NODES, WORKS, MOST_FEW), now (WORKS, MOST_FEW): what they do at the nodes of a
+    step, of which the first does not count, and at a stage. sums (SETS, MOST_FEW): what they would do in a step, with
+    each of some permanent sets.
 
     At their columns: row_motion (TALL, NODES, 2, COLUMN_NODES): elongation and rate of each row; row_sum (SETS,
     COLUMN_NODES): what a row does in a step; total (TALL, COLUMN_NODES): what rows have done while all their members
@@ -134,6 +135,7 @@ def make_few():
         np.zeros(COLUMN_NODES),
         np.zeros(COLUMN_NODES),
         np.zeros((COLUMN_NODES, BROAD)),
+        np.zeros(2),
         np.zeros((NODES, WORKS, MOST_FEW)),
         np.zeros((WORKS, MOST_FEW)),
         np.zeros((SETS, MOST_FEW)),
@@ -194,17 +196,12 @@ def _choose(tile, level, first, few):
 
     Returns whether there are any.
     """
-    size = BROAD >> level
     grids, height = tile.grids, tile.height
     chosen = COLUMN_NODE[level]
-    begin = tile.j * BROAD + first
-    few.size[PART_COLUMNS] = size
-    fill_weights(grids[1], begin, size, chosen, few.column_node, few.column_weight)
-    fill_column_shares(grids[1], begin, size, few.column_node, few.column_weight, few.column_share)
+    _fill_columns(grids[1], tile.j * BROAD + first, level, few)
     for tried in range(0 if height == TALL and grids[2][tile.i] != 0 else ALL_ROWS, ALL_ROWS + 1):
-        rows = height if tried == ALL_ROWS else ROW_NODES[tried]
-        few.size[FEW_ROWS] = rows
-        few.size[BETWEEN_ROWS] = tried != ALL_ROWS
+        _fill_rows(grids[0], tile.i, height, tried, few)
+        rows = few.size[FEW_ROWS]
         for r in range(rows):
             row = r if tried == ALL_ROWS else ROW_NODE[tried, r]
             for b in range(COLUMN_NODES):
@@ -213,17 +210,60 @@ def _choose(tile, level, first, few):
         for d in range(member.shape[0]):
             for m in range(rows * COLUMN_NODES):
                 member[d, FEW_AT + m] = member[d, loaded_at(few.places[m])]
-        if tried == ALL_ROWS:
-            few.row_share[:] = 0.0
-            for r in range(rows):
-                few.row_share[r, r] = 1.0
-        else:
-            node, weight = few.row_node[:rows], few.row_weight[:rows]
-            fill_weights(grids[0], tile.i * TALL, np.int64(TALL), ROW_NODE[tried], node, weight)
-            fill_row_shares(grids[0], tile.i, node, weight, few.row_share)
         if _is_enough(tile, few):
             return True
     return False
+
+
+@kernel
+def _fill_columns(numbers, begin, level, few):
+    """Set by how much values at the columns of the few count in all columns of a part.
+
+    numbers (n,): of the points of the second grid. begin: which one the part begins with. level: of the part.
+    few: a `FewMembers`.
+    """
+    size = BROAD >> level
+    few.size[PART_COLUMNS] = size
+    fill_weights(numbers, begin, size, COLUMN_NODE[level], few.column_node, few.column_weight)
+    fill_column_shares(numbers, begin, size, few.column_node, few.column_weight, few.column_share)
+    few.between[BY_COLUMNS] = _lebesgue(few.column_share[:, :size].T)
+
+
+@kernel
+def _fill_rows(numbers, i, height, tried, few):
+    """Set by how much values at the rows of the few count in all rows of a tile.
+
+    numbers (n,): of the points of the first grid. i, height: the strip of the tile, and how many rows it has.
+    tried: which number of rows, of ROW_NODES, or ALL_ROWS.
+    few: a `FewMembers`.
+    """
+    rows = height if tried == ALL_ROWS else ROW_NODES[tried]
+    few.size[FEW_ROWS] = rows
+    few.size[BETWEEN_ROWS] = tried != ALL_ROWS
+    if tried == ALL_ROWS:
+        few.row_share[:] = 0.0
+        for r in range(rows):
+            few.row_share[r, r] = 1.0
+    else:
+        node, weight = few.row_node[:rows], few.row_weight[:rows]
+        fill_weights(numbers, i * TALL, np.int64(TALL), ROW_NODE[tried], node, weight)
+        fill_row_shares(numbers, i, node, weight, few.row_share)
+    few.between[BY_ROWS] = _lebesgue(few.row_share[:, :rows])
+
+
+@kernel
+def _lebesgue(share):
+    """The Lebesgue constant of nodes at some places: the largest sum of the magnitudes of their shares (places, nodes).
+
+    The polynomial through values at the nodes is at no place larger than so many times the largest of them.
+    """
+    most = 0.0
+    for a in range(share.shape[0]):
+        total = 0.0
+        for k in range(share.shape[1]):
+            total += abs(share[a, k])
+        most = max(most, total)
+    return most
 
 
 @kernel
@@ -442,7 +482,7 @@ def _bound_all(few):
                 for b in range(0, COLUMN_NODES, lanes()):
                     value = load(node, b) * (0.5 * (other - one)) + 0.5 * (one + other)
                     off = larger(magnitude(load(works, begin + r * COLUMN_NODES + b) - value), off)
-        more = BETWEEN * BETWEEN * largest(off)
+        more = few.between[BY_ROWS] * few.between[BY_COLUMNS] * largest(off)
         box[LOW if q == 0 else SLOWEST] = low - more
         box[HIGH if q == 0 else FASTEST] = high + more
     least = few.sets[0, 0]
@@ -486,7 +526,7 @@ def _move_rows(height, few):
                 half = 0.5 * (other - one)
                 for b in range(0, COLUMN_NODES, lanes()):
                     off = larger(magnitude(load(motion, to + b) - (load(node, b) * half + middle)), off)
-            more = BETWEEN * largest(off)
+            more = few.between[BY_COLUMNS] * largest(off)
             box[a, LOW if q == 0 else SLOWEST] = low - more
             box[a, HIGH if q == 0 else FASTEST] = high + more
         box[a, LOW] -= few.sets[a, 1]
