@@ -94,7 +94,7 @@ class _Rows(NamedTuple):
 def pricing_states_of(driver: "GeneralDriver", factor: FloatArray) -> PricingStates:
     """The states from which prices follow, of the rows of a driver's last evaluation times factor (n_resp, R)."""
     model, count = driver.model_of_run, driver.count
-    index = driver.room_ints[: 4 * (int(driver.limits[1]) + 1)].reshape(-1, 4)
+    index = driver.index_of_steps()
     chosen = _rows_of(driver, factor)
     pairs = {int(block[PAIR]): None for block in model.block if driver.case.members[block[GROUP]].candidates}
     size = driver.scene.kinematics

@@ -29,7 +29,7 @@ from mdstopo.general.model.priced_candidates import (
 )
 from mdstopo.general.pricing.certain_modes import FASTEST, HIGH, LOW, SLOWEST, UNSURE
 from mdstopo.general.pricing.loaded_members import loaded_at
-from mdstopo.general.pricing.priced_tile import SETS, add_points, load_tile
+from mdstopo.general.pricing.priced_tile import SETS, add_points, load_tile, set_share
 from mdstopo.general.pricing.sorted_members import (
     CLASSES,
     CORNERS,
@@ -41,12 +41,13 @@ from mdstopo.general.pricing.sorted_members import (
     fill_tangents,
     how_many,
     join_class,
-    sort_known_places,
+    place_in_columns,
+    sort_places,
     stay_in,
     try_mode,
 )
-from mdstopo.general.pricing.sorted_prices import FEW, SHARE_OF_A_CLASS, follow_others, price_each
-from mdstopo.general.pricing.switching_prices import CLOSE, add_polynomial, first_mode
+from mdstopo.general.pricing.sorted_prices import ONE_BY_ONE, SHARE_OF_A_CLASS, follow_others, price_each
+from mdstopo.general.pricing.switching_prices import NO_REST, add_polynomial, mode_at_start
 from mdstopo.general.pricing.switching_together import is_quick
 from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, RATE, WORKS, member_works
 from mdstopo.mechanics.laws.law_table import (
@@ -56,7 +57,6 @@ from mdstopo.mechanics.laws.law_table import (
     law_is_idle,
     law_margin,
     law_remembers,
-    law_start,
 )
 from mdstopo.sensitivity.tile_interpolation import (
     ALL_ROWS,
@@ -80,19 +80,19 @@ from mdstopo.sensitivity.tile_interpolation import (
 
 #: where in the model the members are from which all others follow
 FEW_AT = 2 * PLACES
-#: elongations and rates that follow are to be as exact as this (m, m/s): well below `sorted_members.SURE`
+#: the last coefficients of elongations and rates from which others follow are to be below this (m, m/s), a tenth of
+#: `sorted_members.SURE`
 EXACT = 1e-12
-#: a polynomial through all nodes of a row is nowhere larger than so many times the largest value at a node (its
-#: Lebesgue constant is about 2.2, and a bit more where points of the grid are only nearly at the nodes)
-BETWEEN = 4.0
 #: of the few: how many rows they are in, the columns of the part, whether other rows follow from theirs
 FEW_NUMBERS = 3
-ROWS, COLUMNS, BETWEEN_ROWS = range(FEW_NUMBERS)
+FEW_ROWS, PART_COLUMNS, BETWEEN_ROWS = range(FEW_NUMBERS)
+#: the places of the Lebesgue constants
+BY_ROWS, BY_COLUMNS = range(2)
 
 #: the arrays of a `FewMembers`
 FIELDS = (
-    "size", "places", "row_node", "row_weight", "row_share", "column_node", "column_weight", "column_share", "works",
-    "now", "sums", "row_motion", "box", "row_sum", "total", "found", "row_mode", "sets",
+    "size", "places", "row_node", "row_weight", "row_share", "column_node", "column_weight", "column_share", "between",
+    "works", "now", "sums", "row_motion", "box", "part_box", "row_sum", "total", "row_values", "row_mode", "sets",
 )  # fmt: skip
 
 
@@ -101,17 +101,20 @@ class FewMembers:
 
     size (FEW_NUMBERS,). places (MOST_FEW,): theirs in the tile, row by row. row_node, row_weight (TALL,), column_node,
     column_weight (COLUMN_NODES,): of `fill_weights`. row_share (TALL, TALL): by how much each of their rows counts in a
-    row of the tile. column_share (COLUMN_NODES, BROAD): likewise by columns of the part. works (NODES, WORKS,
-    MOST_FEW), now (WORKS, MOST_FEW): what they do at the nodes of a step, of which the first does not count, and at a
-    stage. sums (SETS, MOST_FEW): what they would do in a step, with each of some permanent sets.
+    row of the tile. column_share (COLUMN_NODES, BROAD): likewise by columns of the part. between (2,): the Lebesgue
+    constants: by how many times what follows between rows, and between columns, may be larger than the largest of the
+    values from which it follows. works (NODES, WORKS, MOST_FEW), now (WORKS, MOST_FEW): what they do at the nodes of a
+    step, of which the first does not count, and at a stage. sums (SETS, MOST_FEW): what they would do in a step, with
+    each of some permanent sets.
 
     At their columns: row_motion (TALL, NODES, 2, COLUMN_NODES): elongation and rate of each row; row_sum (SETS,
     COLUMN_NODES): what a row does in a step; total (TALL, COLUMN_NODES): what rows have done while all their members
     were in one mode.
 
-    box (TALL, 4): the least and the largest elongation (m), and the least and the largest rate (m/s), in each row.
-    found (BROAD,): what members of a row do. row_mode (TALL,): the mode that all members of a row are in, UNSURE where
-    they differ. sets (TALL, 2): the least and the largest permanent set in each row (m).
+    box (TALL, 4): the least and the largest elongation less permanent sets (m), and the least and the largest rate
+    (m/s), in each row. part_box (4,): likewise in the part. row_values (BROAD,): what members of a row do. row_mode
+    (TALL,): the mode that all members of a row are in, UNSURE where they differ. sets (TALL, 2): the least and the
+    largest permanent set in each row (m).
     """
 
     def __init__(self, *_arrays: Any) -> None: ...
@@ -132,11 +135,13 @@ def make_few():
         np.zeros(COLUMN_NODES),
         np.zeros(COLUMN_NODES),
         np.zeros((COLUMN_NODES, BROAD)),
+        np.zeros(2),
         np.zeros((NODES, WORKS, MOST_FEW)),
         np.zeros((WORKS, MOST_FEW)),
         np.zeros((SETS, MOST_FEW)),
         np.zeros((TALL, NODES, 2, COLUMN_NODES)),
         np.zeros((TALL, 4)),
+        np.zeros(4),
         np.zeros((SETS, COLUMN_NODES)),
         np.zeros((TALL, COLUMN_NODES)),
         np.zeros(BROAD),
@@ -191,17 +196,12 @@ def _choose(tile, level, first, few):
 
     Returns whether there are any.
     """
-    size = BROAD >> level
     grids, height = tile.grids, tile.height
     chosen = COLUMN_NODE[level]
-    begin = tile.j * BROAD + first
-    few.size[COLUMNS] = size
-    fill_weights(grids[1], begin, size, chosen, few.column_node, few.column_weight)
-    fill_column_shares(grids[1], begin, size, few.column_node, few.column_weight, few.column_share)
+    _fill_columns(grids[1], tile.j * BROAD + first, level, few)
     for tried in range(0 if height == TALL and grids[2][tile.i] != 0 else ALL_ROWS, ALL_ROWS + 1):
-        rows = height if tried == ALL_ROWS else ROW_NODES[tried]
-        few.size[ROWS] = rows
-        few.size[BETWEEN_ROWS] = tried != ALL_ROWS
+        _fill_rows(grids[0], tile.i, height, tried, few)
+        rows = few.size[FEW_ROWS]
         for r in range(rows):
             row = r if tried == ALL_ROWS else ROW_NODE[tried, r]
             for b in range(COLUMN_NODES):
@@ -210,29 +210,74 @@ def _choose(tile, level, first, few):
         for d in range(member.shape[0]):
             for m in range(rows * COLUMN_NODES):
                 member[d, FEW_AT + m] = member[d, loaded_at(few.places[m])]
-        if tried == ALL_ROWS:
-            few.row_share[:] = 0.0
-            for r in range(rows):
-                few.row_share[r, r] = 1.0
-        else:
-            node, weight = few.row_node[:rows], few.row_weight[:rows]
-            fill_weights(grids[0], tile.i * TALL, np.int64(TALL), ROW_NODE[tried], node, weight)
-            fill_row_shares(grids[0], tile.i, node, weight, few.row_share)
         if _is_enough(tile, few):
             return True
     return False
 
 
 @kernel
+def _fill_columns(numbers, begin, level, few):
+    """Set by how much values at the columns of the few count in all columns of a part.
+
+    numbers (n,): of the points of the second grid. begin: which one the part begins with. level: of the part.
+    few: a `FewMembers`.
+    """
+    size = BROAD >> level
+    few.size[PART_COLUMNS] = size
+    fill_weights(numbers, begin, size, COLUMN_NODE[level], few.column_node, few.column_weight)
+    fill_column_shares(numbers, begin, size, few.column_node, few.column_weight, few.column_share)
+    few.between[BY_COLUMNS] = _lebesgue(few.column_share[:, :size].T)
+
+
+@kernel
+def _fill_rows(numbers, i, height, tried, few):
+    """Set by how much values at the rows of the few count in all rows of a tile.
+
+    numbers (n,): of the points of the first grid. i, height: the strip of the tile, and how many rows it has.
+    tried: which number of rows, of ROW_NODES, or ALL_ROWS.
+    few: a `FewMembers`.
+    """
+    rows = height if tried == ALL_ROWS else ROW_NODES[tried]
+    few.size[FEW_ROWS] = rows
+    few.size[BETWEEN_ROWS] = tried != ALL_ROWS
+    if tried == ALL_ROWS:
+        few.row_share[:] = 0.0
+        for r in range(rows):
+            few.row_share[r, r] = 1.0
+    else:
+        node, weight = few.row_node[:rows], few.row_weight[:rows]
+        fill_weights(numbers, i * TALL, np.int64(TALL), ROW_NODE[tried], node, weight)
+        fill_row_shares(numbers, i, node, weight, few.row_share)
+    few.between[BY_ROWS] = _lebesgue(few.row_share[:, :rows])
+
+
+@kernel
+def _lebesgue(share):
+    """The Lebesgue constant of nodes at some places: the largest sum of the magnitudes of their shares (places, nodes).
+
+    The polynomial through values at the nodes is at no place larger than so many times the largest of them.
+    """
+    most = 0.0
+    for a in range(share.shape[0]):
+        total = 0.0
+        for k in range(share.shape[1]):
+            total += abs(share[a, k])
+        most = max(most, total)
+    return most
+
+
+@kernel
 def _is_enough(tile, few):
-    """Whether elongations and rates of all members of a part follow from those of a few of them: at the ends of all
-    steps, between which they hardly change.
+    """Whether elongations and rates of all members of a part follow from those of a few of them.
+
+    Only the last node of each step is looked at: positions are smooth over a step. What is left out inside is caught
+    for sums by `_sum_stages`, for modes by SURE.
 
     tile, few: as of `_choose`.
     """
     candidates = tile.candidates
     run = candidates.run[tile.k]
-    count = few.size[ROWS] * COLUMN_NODES
+    count = few.size[FEW_ROWS] * COLUMN_NODES
     for s in range(run[FIRST_STEP], run[LAST_STEP]):
         if candidates.step[s, KIND] == POINT:
             continue
@@ -252,7 +297,7 @@ def _worst_tail(values, few):
 
     values (MOST_FEW,): of the members of a `FewMembers`.
     """
-    rows = few.size[ROWS]
+    rows = few.size[FEW_ROWS]
     worst = 0.0
     for r in range(rows):
         worst = worse(worst, tail(values, r * COLUMN_NODES, 1, few.column_node, few.column_weight))
@@ -272,30 +317,32 @@ def _follow_part(tile, first, few):
     """
     candidates = tile.candidates
     run = candidates.run[tile.k]
-    started = False
-    begun = False
-    ends = np.int64(0)
+    has_modes = False
+    has_whole_step = False
+    # 1 behind a part of a step: the modes and permanent sets then are in row 1
+    behind_part = np.int64(0)
     done = 0.0
     few.total[:] = 0.0
     for s in range(run[FIRST_STEP], run[LAST_STEP]):
         kind = candidates.step[s, KIND]
         if kind == POINT:
-            add_points(tile, s, first, few.size[COLUMNS], begun or ends != 0, ends)
-            done += 1.0 * few.size[COLUMNS] * tile.height
+            add_points(tile, s, first, few.size[PART_COLUMNS], has_whole_step or behind_part != 0, behind_part)
+            done += 1.0 * few.size[PART_COLUMNS] * tile.height
             continue
-        if not started:
+        if not has_modes:
             _begin(tile, s, first, few)
-            started = True
+            has_modes = True
+        # `fresh` is `sets[0]` here; a row with a `row_class` changes neither in the step
         _sort_part(tile, s, first, few)
         done += _price_classes(tile, s, first, few)
         _end_step(tile, s, first, few)
-        ends = np.int64(kind != WHOLE)
-        begun = begun or kind == WHOLE
+        behind_part = np.int64(kind != WHOLE)
+        has_whole_step = has_whole_step or kind == WHOLE
     tile.sorting.row_class[:] = UNSORTED
     for a in range(tile.height):
         _spread_row(few.total[a], few)
-        for b in range(few.size[COLUMNS]):
-            tile.price[a * BROAD + first + b] += few.found[b]
+        for b in range(few.size[PART_COLUMNS]):
+            tile.price[a * BROAD + first + b] += few.row_values[b]
     return done
 
 
@@ -310,25 +357,18 @@ def _begin(tile, s, first, few):
     modes, sets, fresh = tile.lists.modes, tile.lists.sets, tile.lists.fresh
     works, node = tile.sorting.works, tile.following[0]
     code = candidates.run[k, CODE]
-    p = candidates.law[k]
     o = candidates.step[s, FIRST_NODE]
-    t = candidates.step_time[s, 0]
-    for at in range(first, first + few.size[COLUMNS], SHORT):
+    for at in range(first, first + few.size[PART_COLUMNS], SHORT):
         lo = PLACES + at * TALL
         member_works(model, lo, np.int64(SHORT * TALL), candidates.node_pose[o], candidates.node_change[o], works[0])
         for i in range(SHORT * TALL):
-            b = i % TALL * BROAD + at + i // TALL
             if i % TALL >= tile.height:
                 continue
-            x = works[0, ELONGATION, i]
-            rate = works[0, RATE, i]
-            mode = np.int64(law_start(code, p, x, rate, 0.0, t, model.curves, 1.0))
-            if not law_margin(code, p, x, rate, mode, t, model.curves, 1.0) > CLOSE:
-                node[ELONGATION, 0] = x
-                node[RATE, 0] = rate
-                mode = first_mode(model, candidates, k, lo + i, s, node)
-            modes[0, b] = mode
-            sets[0, b] = law_first_set(code, p, x, mode)
+            b = place_in_columns(at, i)
+            node[ELONGATION, 0] = works[0, ELONGATION, i]
+            node[RATE, 0] = works[0, RATE, i]
+            modes[0, b] = mode_at_start(model, candidates, k, lo + i, s, node)
+            sets[0, b] = law_first_set(code, candidates.law[k], node[ELONGATION, 0], modes[0, b])
             fresh[b] = sets[0, b]
     for a in range(tile.height):
         _note_row(tile, a, first, few)
@@ -345,7 +385,7 @@ def _note_row(tile, a, first, few):
     mode = modes[0, begin]
     low = sets[0, begin]
     high = low
-    for b in range(begin, begin + few.size[COLUMNS]):
+    for b in range(begin, begin + few.size[PART_COLUMNS]):
         low = min(low, sets[0, b])
         high = max(high, sets[0, b])
         if modes[0, b] != mode:
@@ -368,8 +408,8 @@ def _sort_part(tile, s, first, few):
     p = candidates.law[k]
     t = candidates.step_time[s, 0]
     o = candidates.step[s, FIRST_NODE]
-    size = few.size[COLUMNS]
-    count = few.size[ROWS] * COLUMN_NODES
+    size = few.size[PART_COLUMNS]
+    count = few.size[FEW_ROWS] * COLUMN_NODES
     for m in range(1, NODES):
         member_works(
             model, np.int64(FEW_AT), count, candidates.node_pose[o + m], candidates.node_change[o + m], few.works[m]
@@ -379,7 +419,7 @@ def _sort_part(tile, s, first, few):
     if few.size[BETWEEN_ROWS] != 0 and _is_of_one_mode(few):
         mode = few.row_mode[0]
         _bound_all(few)
-        if _all_stay(code, p, model.curves, t, mode, few.box[0]):
+        if _all_stay(code, p, model.curves, t, mode, few.part_box):
             own = join_class(mode, mode, size * tile.height, classes)
             row_class[:] = own
             for a in range(tile.height):
@@ -388,8 +428,6 @@ def _sort_part(tile, s, first, few):
     _move_rows(tile.height, few)
     for a in range(tile.height):
         box = few.box[a]
-        box[LOW] -= few.sets[a, 1]
-        box[HIGH] -= few.sets[a, 0]
         mode = few.row_mode[a]
         row_class[a] = UNSORTED
         if mode != UNSURE and _all_stay(code, p, model.curves, t, mode, box):
@@ -399,7 +437,10 @@ def _sort_part(tile, s, first, few):
             if own != UNSORTED:
                 continue
         near = _sort_row(tile, s, a, first, box, few, near)
-    sort_known_places(model, candidates, k, s, sorting.places, near, tile.lists.modes[0], tile.lists.sets[0], sorting)
+    sort_places(
+        model, candidates, k, s, sorting.places, near, np.int64(0), np.bool_(True), tile.lists.modes[0],
+        tile.lists.sets[0], sorting,
+    )  # fmt: skip
 
 
 @part
@@ -415,14 +456,14 @@ def _is_of_one_mode(few):
 @kernel
 def _bound_all(few):
     """Write the range of elongations less permanent sets, and of rates, of all members of a part at the nodes of a
-    step but for the first into row 0 of the box of a `FewMembers`, of a part whose rows follow from others.
+    step but for the first into `part_box` of a `FewMembers`, of a part whose rows follow from others.
 
     They are bilinear in the places of both points, between what they are at the corners, but for a rest that is known
     at the few members.
     """
-    works, box, node, row_node = few.works, few.box, few.column_node, few.row_node
+    works, box, node, row_node = few.works, few.part_box, few.column_node, few.row_node
     works = works.reshape(works.size)
-    rows = few.size[ROWS]
+    rows = few.size[FEW_ROWS]
     for q in range(2):
         low = np.inf
         high = -np.inf
@@ -441,27 +482,27 @@ def _bound_all(few):
                 for b in range(0, COLUMN_NODES, lanes()):
                     value = load(node, b) * (0.5 * (other - one)) + 0.5 * (one + other)
                     off = larger(magnitude(load(works, begin + r * COLUMN_NODES + b) - value), off)
-        more = BETWEEN * BETWEEN * largest(off)
-        box[0, LOW if q == 0 else SLOWEST] = low - more
-        box[0, HIGH if q == 0 else FASTEST] = high + more
+        more = few.between[BY_ROWS] * few.between[BY_COLUMNS] * largest(off)
+        box[LOW if q == 0 else SLOWEST] = low - more
+        box[HIGH if q == 0 else FASTEST] = high + more
     least = few.sets[0, 0]
     most = few.sets[0, 1]
     for a in range(1, TALL):
         least = min(least, few.sets[a, 0])
         most = max(most, few.sets[a, 1])
-    box[0, LOW] -= most
-    box[0, HIGH] -= least
+    box[LOW] -= most
+    box[HIGH] -= least
 
 
 @kernel
 def _move_rows(height, few):
     """Elongations and rates of rows at the columns of the few, at the nodes of a step but for the first, and the range
-    of those of all members of each row.
+    of elongations less permanent sets, and of rates, of all members of each row.
 
     height, few: how many rows there are, and a `FewMembers`, of which `row_motion` and `box` are set.
     """
     share, works, motion, node = few.row_share, few.works, few.row_motion, few.column_node
-    rows, box = few.size[ROWS], few.box
+    rows, box = few.size[FEW_ROWS], few.box
     # places are counted here: slices would take longer than the sums
     works, motion = works.reshape(works.size), motion.reshape(motion.size)
     for a in range(height):
@@ -485,9 +526,11 @@ def _move_rows(height, few):
                 half = 0.5 * (other - one)
                 for b in range(0, COLUMN_NODES, lanes()):
                     off = larger(magnitude(load(motion, to + b) - (load(node, b) * half + middle)), off)
-            more = BETWEEN * largest(off)
+            more = few.between[BY_COLUMNS] * largest(off)
             box[a, LOW if q == 0 else SLOWEST] = low - more
             box[a, HIGH if q == 0 else FASTEST] = high + more
+        box[a, LOW] -= few.sets[a, 1]
+        box[a, HIGH] -= few.sets[a, 0]
 
 
 @kernel
@@ -502,7 +545,7 @@ def _move_members(a, first, few, sets, works):
     motion, share = motion.reshape(motion.size), share.reshape(share.size)
     many = works.shape[2]
     works = works.reshape(works.size)
-    size = few.size[COLUMNS]
+    size = few.size[PART_COLUMNS]
     for m in range(1, NODES):
         for q in range(2):
             own = ((a * NODES + m) * 2 + q) * COLUMN_NODES
@@ -526,7 +569,7 @@ def _all_stay(code, p, curves, t, mode, box):
     for corner in range(CORNERS):
         x = box[LOW if corner < 2 else HIGH]
         rate = box[SLOWEST if corner % 2 == 0 else FASTEST]
-        if not law_margin(code, p, x, rate, mode, t, curves, 1.0) > SURE:
+        if not law_margin(code, p, x, rate, mode, t, curves, NO_REST) > SURE:
             return False
     return True
 
@@ -546,7 +589,7 @@ def _sort_row(tile, s, a, first, box, few, near):
     """
     sorting, modes, sets = tile.sorting, tile.lists.modes, tile.lists.sets
     kind, classes, tried = sorting.kind, sorting.classes, sorting.tried
-    size = few.size[COLUMNS]
+    size = few.size[PART_COLUMNS]
     begin = a * BROAD + first
     _move_members(a, first, few, sets, sorting.works)
     count = np.int64(0)
@@ -590,7 +633,7 @@ def _price_classes(tile, s, first, few):
     Returns how many prices were computed.
     """
     candidates, k, lists, classes = tile.candidates, tile.k, tile.lists, tile.sorting.classes
-    size = few.size[COLUMNS]
+    size = few.size[PART_COLUMNS]
     to = np.int64(0) if candidates.step[s, KIND] == WHOLE else np.int64(1)
     if to == 1:
         for a in range(tile.height):
@@ -604,9 +647,11 @@ def _price_classes(tile, s, first, few):
         if classes[c, FROM] == classes[c, TO]:
             if candidates.step[s, MOVES] == 0 or law_is_idle(candidates.run[k, CODE], classes[c, FROM]):
                 continue
-            if classes[c, COUNT] > FEW and _price_staying(tile, s, first, c, few):
-                done += 1.0 * few.size[ROWS] * COLUMN_NODES
-                continue
+            if classes[c, COUNT] > ONE_BY_ONE:
+                have_prices, computed = _price_staying(tile, s, first, c, few)
+                done += computed
+                if have_prices:
+                    continue
         done += price_each(tile, s, first, size, c, to)
     return done + follow_others(tile, s, first, size, np.bool_(True), to)
 
@@ -619,11 +664,11 @@ def _price_staying(tile, s, first, c, few):
 
     tile, first, few: as of `_choose`. s, c: numbers of the step and of the class.
 
-    Returns whether they have their prices: not where what they do is not smooth enough.
+    Returns whether they have their prices, not where what they do is not smooth enough, and how many were computed.
     """
     price, kind, row_class, sets = tile.price, tile.sorting.kind, tile.sorting.row_class, tile.lists.sets
     mode = tile.sorting.classes[c, FROM]
-    size = few.size[COLUMNS]
+    size = few.size[PART_COLUMNS]
     low = np.inf
     high = -np.inf
     for a in range(tile.height):
@@ -636,8 +681,9 @@ def _price_staying(tile, s, first, c, few):
                     low = min(low, sets[0, b])
                     high = max(high, sets[0, b])
     count = np.int64(SETS if low != high and _knows_sets(tile, s, mode) else 1)
+    computed = 1.0 * count * few.size[FEW_ROWS] * COLUMN_NODES
     if not _sum_stages(tile, s, mode, low, high, count, few) <= SHARE_OF_A_CLASS * tile.error:
-        return False
+        return False, computed
     for a in range(tile.height):
         if row_class[a] != c and row_class[a] != UNSORTED:
             continue
@@ -654,9 +700,9 @@ def _price_staying(tile, s, first, c, few):
                     share = 1.0
                     if count > 1:
                         t = 2.0 * (sets[0, begin + b] - low) / (high - low) - 1.0
-                        share = 1.0 - t * t if n == 1 else 0.5 * t * (t + n - 1.0)
-                    price[begin + b] += share * few.found[b]
-    return True
+                        share = set_share(n, t)
+                    price[begin + b] += share * few.row_values[b]
+    return True, computed
 
 
 @part
@@ -671,7 +717,7 @@ def _knows_sets(tile, s, mode):
     for x in range(2):
         _, by_x, _, _, energy_by_x = law(
             tile.candidates.run[tile.k, CODE], tile.candidates.law[tile.k], 1.0 * x, 0.0, mode, t, 0.0,
-            tile.model.curves, 1.0,
+            tile.model.curves, NO_REST,
         )  # fmt: skip
         knows = knows or by_x != 0.0 or energy_by_x != 0.0
     return knows
@@ -688,7 +734,7 @@ def _sum_stages(tile, s, mode, low, high, count, few):
     """
     model, candidates, k, following, now = tile.model, tile.candidates, tile.k, tile.following, few.now
     code = candidates.run[k, CODE]
-    members = few.size[ROWS] * COLUMN_NODES
+    members = few.size[FEW_ROWS] * COLUMN_NODES
     few.sums[:count] = 0.0
     for o in range(candidates.step[s, FIRST_STAGE], candidates.step[s, LAST_STAGE]):
         member_works(model, np.int64(FEW_AT), members, candidates.pose[o, 0], candidates.change[o, 0], now)
@@ -714,21 +760,21 @@ def _sum_row(a, count, few):
     for n in range(count):
         for b in range(0, COLUMN_NODES, lanes()):
             value = zero()
-            for r in range(few.size[ROWS]):
+            for r in range(few.size[FEW_ROWS]):
                 value += share[a, r] * load(sums, n * MOST_FEW + r * COLUMN_NODES + b)
             store(row_sum, n * COLUMN_NODES + b, value)
 
 
 @kernel
 def _spread_row(values, few):
-    """Write into `found` of a `FewMembers` what all members of a row have, from values (COLUMN_NODES,) at columns."""
-    share, found = few.column_share, few.found
+    """What all members of a row have, from values (COLUMN_NODES,) at columns: `row_values` of a `FewMembers` is set."""
+    share, row_values = few.column_share, few.row_values
     share = share.reshape(share.size)
-    for b in range(0, few.size[COLUMNS], lanes()):
+    for b in range(0, few.size[PART_COLUMNS], lanes()):
         value = zero()
         for c in range(COLUMN_NODES):
             value += values[c] * load(share, c * BROAD + b)
-        store(found, b, value)
+        store(row_values, b, value)
 
 
 @kernel
@@ -742,7 +788,7 @@ def _end_step(tile, s, first, few):
     for a in range(tile.height):
         if whole and row_class[a] != UNSORTED:
             continue
-        for b in range(a * BROAD + first, a * BROAD + first + few.size[COLUMNS]):
+        for b in range(a * BROAD + first, a * BROAD + first + few.size[PART_COLUMNS]):
             if whole:
                 sets[0, b] = fresh[b]
             else:

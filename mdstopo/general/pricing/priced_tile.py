@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.pricing.certain_modes import make_spans
 from mdstopo.general.pricing.loaded_members import load_all, loaded_at
@@ -113,6 +113,14 @@ def load_tile(tile):
     if tile.lists.todo[LOADED] == 0:
         load_all(tile.model, tile.candidates, tile.k, tile.grids, tile.i, tile.j, tile.lists.whole)
         tile.lists.todo[LOADED] = 1
+
+
+@part
+def set_share(n, t):
+    """By how much the price with the least (n = 0), the middle (1) or the largest (2) permanent set of some members
+    counts for a member with the set t, on a scale on which these are -1, 0 and 1: the polynomial of the second degree.
+    """
+    return 1.0 - t * t if n == 1 else 0.5 * t * (t + n - 1.0)
 
 
 @kernel

@@ -46,7 +46,7 @@ from mdstopo.general.pricing.sorted_members import (
     join_class,
     try_mode,
 )
-from mdstopo.general.pricing.switching_prices import CLOSE
+from mdstopo.general.pricing.switching_prices import CLOSE, NO_REST
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, rotations
 from mdstopo.mechanics.laws.law_table import law_start
 from mdstopo.sensitivity.tile_interpolation import BROAD
@@ -164,7 +164,7 @@ def _modes_to_try(code, p, curves, t, box, linear, tried):
             own = linear[(i - CORNERS) // NODES, 0, (i - CORNERS) % NODES]
             x = own[X]
             rate = own[V]
-        now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, 1.0))
+        now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, NO_REST))
         count = try_mode(now, count, tried)
     return count
 

@@ -19,7 +19,7 @@ from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODE, NODES
 from mdstopo.general.pricing.certain_modes import NARROW, UNSURE
 from mdstopo.general.pricing.loaded_members import take_members
-from mdstopo.general.pricing.switching_prices import CLOSE, range_of
+from mdstopo.general.pricing.switching_prices import CLOSE, NO_REST, range_of
 from mdstopo.general.pricing.switching_together import is_quick
 from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, RATE, WORKS, member_works
 from mdstopo.mechanics.laws.law_table import (
@@ -61,10 +61,11 @@ class Sorting:
     """What sorting a tile needs, inside kernels.
 
     kind (PLACES,): the class of each member. row_class (TALL,): the class that all members of a row are in, or UNSORTED
-    where they may differ. classes (CLASSES, CLASS_NUMBERS): what is known of each. places (PLACES,):
-    places of some members. mode (NODES,): of all members of a part at the nodes of a step. works (NODES, WORKS, MANY):
-    what members do there. unsorted: 1 for each of the narrowest parts that is not sorted. tried (TRIED,), tangent:
-    modes in which members may stay, and the tangents of their margins.
+    where they may differ; UNSORTED outside `followed_by_few.follow_parts`, as `sorted_prices._list_places` relies on.
+    classes (CLASSES, CLASS_NUMBERS): what is known of each. places (PLACES,): places of some members. mode (NODES,): of
+    all members of a part at the nodes of a step. works (NODES, WORKS, MANY): what members do there. unsorted: 1 for
+    each of the narrowest parts that is not sorted. tried (TRIED,), tangent: modes in which members may stay, and the
+    tangents of their margins.
     """
 
     def __init__(self, *_arrays: Any) -> None: ...
@@ -185,7 +186,7 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
             member_works(model, lo, size * TALL, candidates.node_pose[o], candidates.node_change[o], works[m])
             if law_remembers(code):
                 for i in range(size * TALL):
-                    works[m, ELONGATION, i] -= kept[_place(first, i)]
+                    works[m, ELONGATION, i] -= kept[place_in_columns(first, i)]
     count = np.int64(0)
     if is_quick(code, p, model.curves) and (known or not law_remembers(code)):
         count = _fill_tried(code, p, model.curves, candidates.step_time[s, 0], first, size, known, begin, sorting)
@@ -195,14 +196,14 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
         for n in range(count):
             bits = stay_in(n, i, np.int64(0), sorting) & left
             for lane in range(lanes() if bits != 0 else 0):
-                at = _place(first, i + lane)
+                at = place_in_columns(first, i + lane)
                 if (bits >> lane) & 1 == 1 and (not known or begin[at] == tried[n]):
                     own = join_class(tried[n], tried[n], 1, classes)
                     kind[at] = own
                     left &= ~(1 << lane)
         for lane in range(lanes() if left != 0 else 0):
             if (left >> lane) & 1 == 1:
-                at = _place(first, i + lane)
+                at = place_in_columns(first, i + lane)
                 old = begin[at] if known else np.int64(UNSURE)
                 old, new = _modes_of(
                     code, p, model.curves, free[lo + i + lane], candidates.step_time[s], old, mode, works, i + lane
@@ -211,14 +212,15 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
 
 
 @kernel
-def sort_places(model, candidates, k, s, places, count, modes, sorting):
-    """Sort some members of a tile by a law that does not remember, of which `is_quick`.
+def sort_places(model, candidates, k, s, places, count, modes, known, begin, kept, sorting):
+    """Sort some members of a tile by a law of which `is_quick`.
 
     In:
       model: with the members of the tile (`load_all`).
       candidates, k, s: as of `sort_members`.
       places (count or more,), count: which members, and how many.
-      modes: how many modes in which members may stay are tried.
+      modes: how many modes in which members may stay are tried, of a law that does not remember; else 0.
+      known, begin, kept: as of `sort_members`.
     In place:
       sorting: a `Sorting`, with these modes and the tangents of their margins in a range that all members are in;
         classes of the members are set, and added to those that there are.
@@ -236,6 +238,9 @@ def sort_places(model, candidates, k, s, places, count, modes, sorting):
         for m in range(NODES):
             o = candidates.step[s, FIRST_NODE] + m
             member_works(model, np.int64(0), wide, candidates.node_pose[o], candidates.node_change[o], works[m])
+            if law_remembers(code):
+                for i in range(wide):
+                    works[m, ELONGATION, i] -= kept[places[at + i]]
         for i in range(0, wide, lanes()):
             left = (1 << min(wide - i, lanes())) - 1
             _fill_masks(modes, i, sorting, inside, outside)
@@ -251,43 +256,12 @@ def sort_places(model, candidates, k, s, places, count, modes, sorting):
                             kind[places[at + i + lane]] = own
             for lane in range(lanes() if left != 0 else 0):
                 if (left >> lane) & 1 == 1:
+                    place = places[at + i + lane]
+                    old = begin[place] if known else np.int64(UNSURE)
                     old, new = _modes_of(
-                        code, p, model.curves, free[i + lane], candidates.step_time[s], np.int64(UNSURE), mode, works,
-                        i + lane,
+                        code, p, model.curves, free[i + lane], candidates.step_time[s], old, mode, works, i + lane
                     )  # fmt: skip
-                    own = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
-                    kind[places[at + i + lane]] = own
-
-
-@kernel
-def sort_known_places(model, candidates, k, s, places, count, begin, kept, sorting):
-    """Sort some members of a tile of which it is known in which modes they begin.
-
-    In:
-      model: with the members of the tile (`load_all`).
-      candidates, k, s, begin, kept: as of `sort_members`.
-      places (count or more,), count: which members, and how many.
-    In place:
-      sorting: a `Sorting`: classes of the members are set, and added to those that there are.
-    """
-    kind, classes, mode, works = sorting.kind, sorting.classes, sorting.mode, sorting.works
-    code = candidates.run[k, CODE]
-    free = model.member[MEMBER_FREE_LENGTH]
-    mode[:] = UNSURE
-    for at in range(0, count, MANY):
-        wide = min(MANY, count - at)
-        take_members(model, places[at : at + wide], wide, (wide + WIDE - 1) // WIDE * WIDE)
-        for m in range(NODES):
-            o = candidates.step[s, FIRST_NODE] + m
-            member_works(model, np.int64(0), wide, candidates.node_pose[o], candidates.node_change[o], works[m])
-            for i in range(wide):
-                works[m, ELONGATION, i] -= kept[places[at + i]]
-        for i in range(wide):
-            place = places[at + i]
-            old, new = _modes_of(
-                code, candidates.law[k], model.curves, free[i], candidates.step_time[s], begin[place], mode, works, i
-            )  # fmt: skip
-            kind[place] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
+                    kind[place] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
 
 
 @part
@@ -342,7 +316,7 @@ def how_many(bits):
 
 
 @part
-def _place(first, i):
+def place_in_columns(first, i):
     """The place in the tile of member i of columns from the first one on."""
     return i % TALL * BROAD + first + i // TALL
 
@@ -373,9 +347,9 @@ def _fill_tried(code, p, curves, t, first, size, known, begin, sorting):
         return count
     for i in range(size * TALL if known else CORNERS):
         if known:
-            now = begin[_place(first, i)]
+            now = begin[place_in_columns(first, i)]
         else:
-            now = np.int64(law_start(code, p, box[i // 2], box[2 + i % 2], 0.0, t, curves, 1.0))
+            now = np.int64(law_start(code, p, box[i // 2], box[2 + i % 2], 0.0, t, curves, NO_REST))
         count = try_mode(now, count, tried)
     fill_tangents(code, p, curves, t, box, count, tried, tangent)
     return count
@@ -396,9 +370,9 @@ def fill_tangents(code, p, curves, t, box, count, tried, tangent):
         for corner in range(CORNERS):
             x = box[corner // 2]
             rate = box[2 + corner % 2]
-            by_x, by_rate = law_margin_slopes(code, p, x, rate, tried[n], t, curves, 1.0)
+            by_x, by_rate = law_margin_slopes(code, p, x, rate, tried[n], t, curves, NO_REST)
             tangent[n, corner, AT_ZERO] = (
-                law_margin(code, p, x, rate, tried[n], t, curves, 1.0) - by_x * x - by_rate * rate
+                law_margin(code, p, x, rate, tried[n], t, curves, NO_REST) - by_x * x - by_rate * rate
             )
             tangent[n, corner, BY_ELONGATION] = by_x
             tangent[n, corner, BY_RATE] = by_rate

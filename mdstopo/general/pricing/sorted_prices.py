@@ -43,7 +43,7 @@ from mdstopo.sensitivity.tile_interpolation import (
 )
 
 #: classes of as many members or fewer are computed member by member
-FEW = 96
+ONE_BY_ONE = 96
 #: the prices of a class in a step may be off by this part of what those of all listed steps together may be. It is not
 #: divided by the number of steps, too: over many steps with classes more may add up
 SHARE_OF_A_CLASS = 0.25
@@ -86,7 +86,7 @@ def price_part(tile, s, level, first, size, smooth, begun):
             continue
         stays = classes[c, FROM] == classes[c, TO]
         idle = stays and law_is_idle(code, classes[c, FROM])
-        if stays and smooth and classes[c, COUNT] > FEW and not idle:
+        if stays and smooth and classes[c, COUNT] > ONE_BY_ONE and not idle:
             done += _price_by_few(tile, s, level, first, c)
         if (idle or classes[c, COUNT] == 0) and not law_remembers(code):
             continue
@@ -133,7 +133,10 @@ def _sort_part(tile, s, level, first):
         tried = sort_by_lines(model, candidates, k, s, level, first, height, tile.spans, sorting)
         if tried >= 0:
             count = _list_places(tile, np.int64(UNSORTED), first, BROAD >> level)
-            sort_places(model, candidates, k, s, sorting.places, count, tried, sorting)
+            sort_places(
+                model, candidates, k, s, sorting.places, count, tried, np.bool_(False), lists.modes[0], lists.sets[0],
+                sorting,
+            )  # fmt: skip
             return
         sorting.classes[:] = 0
     begin = first // NARROW
@@ -262,7 +265,7 @@ def follow_others(tile, s, first, size, begun, to):
     modes, sets, fresh = tile.lists.modes, tile.lists.sets, tile.lists.fresh
     places = tile.sorting.places
     yes = np.bool_(True)
-    few = np.zeros(ROW)
+    values = np.zeros(ROW)
     count = _list_places(tile, np.int64(UNSORTED), first, size)
     for at in range(0, count, ROW):
         wide = min(ROW, count - at)
@@ -270,13 +273,13 @@ def follow_others(tile, s, first, size, begun, to):
         for m in range(wide):
             following[4][0, m] = modes[0, places[at + m]]
             following[5][0, m] = sets[0, places[at + m]]
-        few[:] = 0.0
+        values[:] = 0.0
         price_step(
-            model, candidates, k, np.int64(0), wide, s, following[4][0], following[5][0], begun, yes, following, few
+            model, candidates, k, np.int64(0), wide, s, following[4][0], following[5][0], begun, yes, following, values
         )  # fmt: skip
         for m in range(wide):
             b = places[at + m]
-            price[b] += few[m]
+            price[b] += values[m]
             if law_remembers(candidates.run[k, CODE]):
                 modes[to, b] = following[4][1, m]
                 fresh[b] = following[5][1, m]

@@ -68,6 +68,8 @@ FROM_PLACES[1] = np.linalg.inv(np.vander(PLACE[1], increasing=True))
 #: members that are followed at once, and what stands for the mode of one that leaves it
 ROW = 16
 NOWHERE = -1
+#: the free length (m) that is given to a law that does not depend on it
+NO_REST = 1.0
 #: a margin below this leaves open in which mode a member begins, and its second derivative decides (m, m/s or a part)
 CLOSE = 1e-6
 #: a mode is over where its margin is below zero by more than rounding, this part of 1 m and the member's length: right
@@ -188,7 +190,7 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
     first = step[FIRST_NODE]
     level = candidates.node_level[first : first + NODES]
     weight = candidates.node_energy[first : first + NODES]
-    found = begun and law_remembers(code)
+    known = begun and law_remembers(code)
     stay = False
     for m in range(NODES):
         o = first + m
@@ -200,10 +202,8 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
         rest = free[at + i]
         mode = np.int64(begin[i])
         kept = begin_set[i]
-        if not found:
-            mode = np.int64(law_start(code, p, node[ELONGATION, 0], node[RATE, 0], 0.0, time[0], curves, rest))
-            if not law_margin(code, p, node[ELONGATION, 0], node[RATE, 0], mode, time[0], curves, rest) > CLOSE:
-                mode = first_mode(model, candidates, k, at + i, s, node)
+        if not known:
+            mode = mode_at_start(model, candidates, k, at + i, s, node)
             kept = law_first_set(code, p, node[ELONGATION, 0], mode)
         last = _follow(code, p, curves, rest, time, mode, kept, node, power, pieces)
         modes[1, i] = int(pieces[last, PIECE_MODE])
@@ -310,7 +310,7 @@ def fill_law(code, p, curves, t, value, low, high, mode, node, power):
     by_rate = 0.0
     for m in range(places):
         f, _, by_rate, energy, _ = law(
-            code, p, middle + half * PLACE[five, m], 0.0, mode, t, value, curves, 1.0
+            code, p, middle + half * PLACE[five, m], 0.0, mode, t, value, curves, NO_REST
         )  # fmt: skip
         node[0, m] = f
         node[1, m] = energy
@@ -372,11 +372,11 @@ def add_pieces(code, p, curves, t, value, weight, works, count, node, power, pri
     """
     x = works[ELONGATION]
     low, high = range_of(x, count)
-    last = np.int64(law_start(code, p, high, 0.0, 0.0, t, curves, 1.0))
+    last = np.int64(law_start(code, p, high, 0.0, 0.0, t, curves, NO_REST))
     # before the first piece there is no other, and behind the last one
     begin = -np.inf
-    for mode in range(np.int64(law_start(code, p, low, 0.0, 0.0, t, curves, 1.0)), last + 1):
-        end = np.inf if mode == last else high + law_margin(code, p, high, 0.0, mode, t, curves, 1.0)
+    for mode in range(np.int64(law_start(code, p, low, 0.0, 0.0, t, curves, NO_REST)), last + 1):
+        end = np.inf if mode == last else high + law_margin(code, p, high, 0.0, mode, t, curves, NO_REST)
         # over its own part of the elongations: a steep piece is large beyond it
         least = max(low, begin)
         most = max(min(high, end), least)
@@ -408,8 +408,26 @@ def add_in_mode(code, p, curves, t, value, weight, free, works, mode, price):
             price[i] += f * works[ALONG, i] + weight * energy
 
 
+@part
+def mode_at_start(model, candidates, k, i, s, node):
+    """The mode of member i at the first node of a step.
+
+    model, candidates, k, i, s, node: as of `_by_second_derivative`.
+    """
+    code = candidates.run[k, CODE]
+    p = candidates.law[k]
+    x = node[ELONGATION, 0]
+    rate = node[RATE, 0]
+    t = candidates.step_time[s, 0]
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    mode = np.int64(law_start(code, p, x, rate, 0.0, t, model.curves, rest))
+    if not law_margin(code, p, x, rate, mode, t, model.curves, rest) > CLOSE:
+        mode = _by_second_derivative(model, candidates, k, i, s, node)
+    return mode
+
+
 @kernel
-def first_mode(model, candidates, k, i, s, node):
+def _by_second_derivative(model, candidates, k, i, s, node):
     """The mode of member i at the first node of a step, where that depends on its second derivative.
 
     model: with the members.

@@ -43,6 +43,7 @@ from mdstopo.general.pricing.priced_tile import (
     add_points,
     begin_pricing,
     load_tile,
+    set_share,
 )
 from mdstopo.general.pricing.sorted_members import modes_of_all
 from mdstopo.general.pricing.sorted_prices import NO_LEVEL, price_part
@@ -93,9 +94,8 @@ def price_run(model, candidates, k, place, scratch, lists, price):
     done = 0.0
     if followed and goes_by_few(model, candidates, k):
         done += follow_parts(tile, lists.left)
-    for u in range(steps):
-        if not _is_to_do(lists.left, tile.width):
-            break
+    others = _is_to_do(lists.left, tile.width)
+    for u in range(steps if others else 0):
         if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, MOVES] == 0:
             continue
         if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
@@ -385,11 +385,12 @@ def _price_list(tile, part):
         done += plan[PRICED]
     for a in range(tile.height):
         for at in range(a * BROAD + first, a * BROAD + first + size):
-            value = found[0, at]
-            if high != low:
-                t = 2.0 * (sets[0, at] - low) / (high - low) - 1.0
-                value = 0.5 * t * ((t - 1.0) * value + (t + 1.0) * found[2, at]) + (1.0 - t * t) * found[1, at]
-            price[at] += value
+            if high == low:
+                price[at] += found[0, at]
+                continue
+            t = 2.0 * (sets[0, at] - low) / (high - low) - 1.0
+            for n in range(SETS):
+                price[at] += set_share(n, t) * found[n, at]
     lists.count[part] = 0
     return done * steps
 
