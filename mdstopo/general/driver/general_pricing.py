@@ -19,7 +19,6 @@ from mdstopo.general.model.priced_candidates import (
     NODES,
     NONE,
     PART,
-    PIECES,
     POINT,
     POWERS,
     WHOLE,
@@ -119,11 +118,8 @@ def pricing_states_of(driver: "GeneralDriver", factor: FloatArray) -> PricingSta
 
 
 def _modes(law: Law) -> int:
-    """Which modes a law has for prices, of NONE, FOLLOWED and PIECES."""
-    modes = kernels_of(type(law)).modes
-    if modes is None or not may_switch(law):
-        return NONE
-    return FOLLOWED
+    """Which modes a law has for prices, of NONE and FOLLOWED."""
+    return NONE if kernels_of(type(law)).modes is None or not may_switch(law) else FOLLOWED
 
 
 def _is_even(law: Law) -> bool:

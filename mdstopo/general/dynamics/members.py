@@ -43,8 +43,8 @@ SCALE, MODE, SET = range(3)
 
 #: share of the square of a free length that rounding may take from the square of a length at home
 SURE = 1e-12
-#: of how many members with curves steps end at the knots: of groups of up to SMALL at any tolerance; of up to KNOTTED in
-#: all at tolerances down to COARSE, and of more below it by this power of the tolerance
+#: of how many members with curves steps end at the knots: of groups of up to SMALL at any tolerance; of up to KNOTTED
+#: in all at tolerances down to COARSE, and of more below it by this power of the tolerance
 SMALL, KNOTTED, COARSE, RISE = 12, 40, 1e-6, 0.25
 
 

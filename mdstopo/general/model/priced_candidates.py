@@ -14,9 +14,8 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: columns of `PricedCandidates.run`
 SCENE, CODE, FIRST_STATE, FIRST_ENERGY, LAST_STATE, FIRST_STEP, LAST_STEP, MODES = range(8)
-#: the modes of a law: none, or of no account; those in which its members are followed through the steps; pieces of one
-#: function, of which one counts at a state
-NONE, FOLLOWED, PIECES = range(3)
+#: the modes of a law: none, or of no account; those in which its members are followed through the steps
+NONE, FOLLOWED = range(2)
 #: columns of `PricedCandidates.step`, and what a step may be
 FIRST_STAGE, LAST_STAGE, FIRST_NODE, KIND, MOVES = range(5)
 WHOLE, PART, POINT = range(3)

@@ -33,11 +33,8 @@ from mdstopo.general.model.priced_candidates import (
     CODE,
     FIRST_NODE,
     FIRST_STAGE,
-    FIRST_STATE,
     FIRST_STEP,
-    FOLLOWED,
     KIND,
-    MODES,
     NODE,
     NODES,
     POINT,
@@ -502,12 +499,12 @@ def modes_at_nodes(model, candidates, k, s, which, spans, mode):
 
 @kernel
 def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
-    """What is known of the modes of all members of a part in a step by a law that remembers, or in a state.
+    """What is known of the modes of all members of a part in a step by a law that remembers, or at a state alone.
 
     In:
       model: with the numbers of the laws.
       candidates, k: a `PricedCandidates`, and the number of the run.
-      u: number of the step among those of the run; of laws whose modes are PIECES, of the state.
+      u: number of the step among those of the run.
       which: number of the part.
       mode: that all begin in; negative where it is to be found: the law does not remember, or has not begun.
       low, high: the least and the largest of their permanent sets (m).
@@ -525,12 +522,9 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
     line = line[which]
     number = number[which]
     rest = number[FREE]
-    at_state = run[MODES] != FOLLOWED
-    o = run[FIRST_STATE] + u
     s = run[FIRST_STEP] + u
-    if not at_state and candidates.step[s, KIND] == POINT:
-        at_state = np.bool_(True)
-        o = candidates.step[s, FIRST_STAGE]
+    o = candidates.step[s, FIRST_STAGE]
+    at_state = candidates.step[s, KIND] == POINT
     frame = candidates.frame if at_state else candidates.node_frame
     first = o if at_state else candidates.step[s, FIRST_NODE]
     begin = candidates.when[o] if at_state else candidates.step_time[s, 0]

@@ -364,36 +364,6 @@ def add_polynomial(code, p, curves, t, value, weight, works, count, mode, node, 
 
 
 @kernel
-def add_pieces(code, p, curves, t, value, weight, works, count, node, power, price):
-    """What `add_polynomial` does of members in any of the modes of a law whose modes are pieces of one function, which
-    follow each other along the elongation.
-
-    code, p, curves, t, value, weight, works, count, node, power, price: as there.
-    """
-    x = works[ELONGATION]
-    low, high = range_of(x, count)
-    last = np.int64(law_start(code, p, high, 0.0, 0.0, t, curves, NO_REST))
-    # before the first piece there is no other, and behind the last one
-    begin = -np.inf
-    for mode in range(np.int64(law_start(code, p, low, 0.0, 0.0, t, curves, NO_REST)), last + 1):
-        end = np.inf if mode == last else high + law_margin(code, p, high, 0.0, mode, t, curves, NO_REST)
-        # over its own part of the elongations: a steep piece is large beyond it
-        least = max(low, begin)
-        most = max(min(high, end), least)
-        middle, inverse, by_rate, places = fill_law(code, p, curves, t, value, least, most, mode, node, power)
-        for i in range(0, count, lanes()):
-            own = load(x, i)
-            s = (own - middle) * inverse
-            work = (at_places(power[0], places, s) + by_rate * load(works[RATE], i)) * load(works[ALONG], i)
-            work += weight * at_places(power[1], places, s)
-            work = where_larger(load(works[INVERSE], i), 0.0, work)
-            # that of members behind the end of the piece is taken away again, to the bit
-            within = where_larger(own, begin, work) - where_larger(own, end, work)
-            store(price, i, load(price, i) + within)
-        begin = end
-
-
-@kernel
 def add_in_mode(code, p, curves, t, value, weight, free, works, mode, price):
     """What `add_polynomial` does of any law, member by member.
 

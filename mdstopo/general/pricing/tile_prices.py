@@ -16,16 +16,11 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.model.priced_candidates import (
     CODE,
     FIRST_STAGE,
-    FIRST_STATE,
     FIRST_STEP,
-    FOLLOWED,
     KIND,
     LAST_STAGE,
-    LAST_STATE,
     LAST_STEP,
-    MODES,
     MOVES,
-    PIECES,
     POINT,
     SCENE,
     WHOLE,
@@ -47,14 +42,12 @@ from mdstopo.general.pricing.priced_tile import (
 )
 from mdstopo.general.pricing.sorted_members import modes_of_all
 from mdstopo.general.pricing.sorted_prices import NO_LEVEL, price_part
-from mdstopo.general.pricing.switching_prices import ROW, add_pieces, price_step
-from mdstopo.mechanics.kinematics.kinematics_interface import member_works
+from mdstopo.general.pricing.switching_prices import ROW, price_step
 from mdstopo.mechanics.laws.law_table import law_is_idle, law_remembers
 from mdstopo.sensitivity.tile_interpolation import (
     BROAD,
     LEVELS,
     PARTS,
-    PLACES,
     PRICED,
     SHORT,
     TALL,
@@ -86,24 +79,25 @@ def price_run(model, candidates, k, place, scratch, lists, price):
     for n in range(candidates.curves.shape[1]):
         model.curves[n] = candidates.curves[run[SCENE], n]
     fill_spans(candidates, k, tile.i, tile.j, tile.spans)
-    followed = run[MODES] == FOLLOWED
-    steps = run[LAST_STEP] - run[FIRST_STEP] if followed else run[LAST_STATE] - run[FIRST_STATE]
+    remembers = law_remembers(run[CODE])
+    steps = run[LAST_STEP] - run[FIRST_STEP]
     begun = np.bool_(False)
     # where members that remember are at a state alone: behind a part of a step, or behind the last step
     ends = np.int64(0)
     done = 0.0
-    if followed and goes_by_few(model, candidates, k):
+    if goes_by_few(model, candidates, k):
         done += follow_parts(tile, lists.left)
     others = _is_to_do(lists.left, tile.width)
     for u in range(steps if others else 0):
-        if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, MOVES] == 0:
+        kind = candidates.step[run[FIRST_STEP] + u, KIND]
+        if not remembers and candidates.step[run[FIRST_STEP] + u, MOVES] == 0:
             continue
-        if followed and not law_remembers(run[CODE]) and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
+        if not remembers and kind != POINT:
             done += _price_sorted(tile, u)
             continue
         done += _price_next(tile, u, begun, ends)
-        if followed and candidates.step[run[FIRST_STEP] + u, KIND] != POINT:
-            ends = np.int64(candidates.step[run[FIRST_STEP] + u, KIND] != WHOLE)
+        if kind != POINT:
+            ends = np.int64(kind != WHOLE)
             begun = begun or ends == 0
     for part in range(LISTED_PARTS):
         done += _price_list(tile, part)
@@ -125,9 +119,8 @@ def _price_next(tile, u, begun, ends):
     run = candidates.run[k]
     remembers = law_remembers(run[CODE])
     shared, todo, smooth = lists.shared, lists.todo, tile.grids[3]
-    followed = run[MODES] == FOLLOWED
-    kind = candidates.step[run[FIRST_STEP] + u, KIND] if followed else np.int64(POINT)
-    counts = not followed or candidates.step[run[FIRST_STEP] + u, MOVES] != 0
+    kind = candidates.step[run[FIRST_STEP] + u, KIND]
+    counts = candidates.step[run[FIRST_STEP] + u, MOVES] != 0
     todo[:PARTS] = lists.left
     changed = False
     done = 0.0
@@ -304,9 +297,6 @@ def _follow_each(tile, u, begun, ends, smallest):
     first = smallest * SHORT
     wide = min(SHORT, tile.width - first)
     s = run[FIRST_STEP] + u
-    if run[MODES] == PIECES:
-        _add_by_pieces(tile, run[FIRST_STATE] + u, first, wide)
-        return 1.0 * height * wide
     kind = candidates.step[s, KIND]
     if kind == POINT:
         add_points(tile, s, first, wide, begun or ends != 0, ends)
@@ -326,29 +316,6 @@ def _follow_each(tile, u, begun, ends, smallest):
         for b in range(a * BROAD + first, a * BROAD + first + wide):
             sets[to, b] = fresh[b]
     return followed
-
-
-@kernel
-def _add_by_pieces(tile, o, first, wide):
-    """Add what the members of some columns do at a state by a law whose modes are pieces of one function.
-
-    tile: a `PricedTile`.
-    o: the state.
-    first, wide: the first column, and how many there are, SHORT at most.
-    """
-    model, candidates, k, following = tile.model, tile.candidates, tile.k, tile.following
-    works, price = tile.lists.works, tile.price
-    values = tile.scratch[5]
-    count = wide * TALL
-    member_works(model, PLACES + first * TALL, count, candidates.pose[o, 0], candidates.change[o, 0], works)
-    values[:count] = 0.0
-    add_pieces(
-        candidates.run[k, CODE], candidates.law[k], model.curves, candidates.when[o], candidates.level[o],
-        candidates.energy[o], works, count, following[0], following[1], values,
-    )  # fmt: skip
-    for a in range(tile.height):
-        for b in range(wide):
-            price[a * BROAD + first + b] += values[b * TALL + a]
 
 
 @kernel
@@ -421,10 +388,7 @@ def _add_listed(tile, part, kept, members):
                     model, candidates, k, at, wide, s, following[4][0], following[5][0], yes, yes, following, few
                 )
             continue
-        o = run[FIRST_STATE] + lists.step[part, n]
-        behind = o + 1
-        if run[MODES] == FOLLOWED:
-            o = candidates.step[s, FIRST_STAGE]
-            behind = candidates.step[s, LAST_STAGE]
+        o = candidates.step[s, FIRST_STAGE]
+        behind = candidates.step[s, LAST_STAGE]
         following[5][0, 0] = kept
         add_states(model, candidates, k, o, behind, members, known, following[5][0, :1], lists.works, following, values)
