@@ -22,7 +22,7 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
   let view = null;
   const fit = (members) => {
     const low = [Infinity, Infinity], high = [-Infinity, -Infinity], inner = [], all = [];
-    const m = motion(), fixed = data.designs.find((each) => each.members).members.fixed;
+    const m = motion(), fixed = members.fixed;
     const frames = m ? m.q.filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
     for (const q of frames) {
       data.bodies.forEach((body, b) => {

@@ -56,7 +56,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
 
   // one window for all frames of a motion, so that it stands still
   const fit = (members) => {
-    const m = motion(), inner = [], every = [], fixed = data.designs.find((each) => each.members).members.fixed;
+    const m = motion(), inner = [], every = [], fixed = members.fixed;
     const frames = m ? m.q.filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
     frames.forEach((q, f) => {
       const all = seats(q);

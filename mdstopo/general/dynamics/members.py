@@ -187,8 +187,8 @@ def may_meet(shortest, motion):
 
 
 @kernel
-def most_knotted(tolerance):
-    """Of how many members with curves steps end at the knots.
+def knotted_at(tolerance):
+    """Of how many members with curves steps end at the knots, at a tolerance.
 
     Steps across knots leave the motion within the tolerance, but derivatives off by thousands of it, because stiffness
     has kinks there. To end at each knot costs a step. The smaller the tolerance, the shorter steps are anyway, and the
@@ -215,7 +215,7 @@ def curved_members(model, member_state):
 
 
 @kernel
-def set_modes(model, member_state, rel, rel_rate, most_curved):
+def set_modes(model, member_state, rel, rel_rate, most_knotted):
     """Set the modes and permanent sets of members and contacts in member_state as they are at the start.
 
     Where steps end at the knots of a curve, its pieces are modes; else it has none. That is so of members that carry
@@ -225,7 +225,7 @@ def set_modes(model, member_state, rel, rel_rate, most_curved):
     model: the compiled scene.
     member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member; the scales are read.
     rel (n_pair, POSE): relative poses; rel_rate (n_pair, D): their second derivatives in time.
-    most_curved: up to how many members with curves are few (`most_knotted`); 0: steps end at no knots.
+    most_knotted: up to how many members with curves are few (`knotted_at`); 0: steps end at no knots.
     """
     curved, loaded = curved_members(model, member_state)
     for k in range(model.block.shape[0]):
@@ -235,11 +235,12 @@ def set_modes(model, member_state, rel, rel_rate, most_curved):
         r = rel[model.block[k, PAIR]]
         acc = rel_rate[model.block[k, PAIR]]
         lo = model.block[k, START]
-        small = most_curved > 0 and model.block[k, COUNT] <= SMALL
+        small = most_knotted > 0 and model.block[k, COUNT] <= SMALL
         for i in range(lo, lo + model.block[k, COUNT]):
             _, x, rate = member_motion(model, i, r)
             second = second_rate(model, i, r, acc)
-            few = small or curved <= most_curved or (loaded <= most_curved and member_state[SCALE, i] != 0.0)
+            carries = member_state[SCALE, i] != 0.0
+            few = small or curved <= most_knotted or (carries and loaded <= most_knotted)
             if law_has_pieces(code) and not few:
                 member_state[MODE, i] = 0.0
             else:

@@ -14,9 +14,9 @@ from mdstopo.general.dynamics.accelerations import make_workspace, solve_acceler
 from mdstopo.general.dynamics.members import (
     MODE,
     SET,
+    knotted_at,
     may_meet,
     meeting,
-    most_knotted,
     scale_general,
     shortest_at_start,
 )
@@ -301,8 +301,8 @@ def run_adaptive(
         moving[d] = model.mass[d] if model.free[d] != 0 else 0.0
     measures = explicit and method == 1 and not fixed_step > 0.0
     if switching:
-        most_curved = most_knotted(settings[0])
-        singular = modes_at_start(model, member_state, workspace, q0, v0, a0, lam, most_curved)
+        most_knotted = knotted_at(settings[0])
+        singular = modes_at_start(model, member_state, workspace, q0, v0, a0, lam, most_knotted)
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t

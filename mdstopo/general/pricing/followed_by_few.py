@@ -479,9 +479,7 @@ def _bound_all(few):
                 share = 0.5 * (1.0 + row_node[r])
                 one = first + share * (third - first)
                 other = second + share * (fourth - second)
-                for b in range(0, COLUMN_NODES, lanes()):
-                    value = load(node, b) * (0.5 * (other - one)) + 0.5 * (one + other)
-                    off = larger(magnitude(load(works, begin + r * COLUMN_NODES + b) - value), off)
+                off = _off_line(works, begin + r * COLUMN_NODES, node, one, other, off)
         more = few.between[BY_ROWS] * few.between[BY_COLUMNS] * largest(off)
         box[LOW if q == 0 else SLOWEST] = low - more
         box[HIGH if q == 0 else FASTEST] = high + more
@@ -492,6 +490,21 @@ def _bound_all(few):
         most = max(most, few.sets[a, 1])
     box[LOW] -= most
     box[HIGH] -= least
+
+
+@part
+def _off_line(values, begin, node, one, other, off):
+    """How far values at the columns of the few are from a line, in vectors, where that is more than `off`.
+
+    values, begin: the values, and where those at the first column are.
+    node (COLUMN_NODES,): of `fill_weights`. one, other: the line at its ends.
+    off: a vector, which is returned with what is larger in it.
+    """
+    middle = 0.5 * (one + other)
+    half = 0.5 * (other - one)
+    for b in range(0, COLUMN_NODES, lanes()):
+        off = larger(magnitude(load(values, begin + b) - (load(node, b) * half + middle)), off)
+    return off
 
 
 @kernel
@@ -522,10 +535,7 @@ def _move_rows(height, few):
                 other = motion[to + COLUMN_NODES - 1]
                 low = min(low, min(one, other))
                 high = max(high, max(one, other))
-                middle = 0.5 * (one + other)
-                half = 0.5 * (other - one)
-                for b in range(0, COLUMN_NODES, lanes()):
-                    off = larger(magnitude(load(motion, to + b) - (load(node, b) * half + middle)), off)
+                off = _off_line(motion, to, node, one, other, off)
             more = few.between[BY_COLUMNS] * largest(off)
             box[a, LOW if q == 0 else SLOWEST] = low - more
             box[a, HIGH if q == 0 else FASTEST] = high + more

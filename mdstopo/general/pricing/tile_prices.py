@@ -383,10 +383,10 @@ def _add_listed(tile, part, kept, members):
             following[5][0] = kept
             for at in range(0, members, ROW):
                 wide = min(ROW, members - at)
-                few = values[at : at + wide]
                 price_step(
-                    model, candidates, k, at, wide, s, following[4][0], following[5][0], yes, yes, following, few
-                )
+                    model, candidates, k, at, wide, s, following[4][0], following[5][0], yes, yes, following,
+                    values[at : at + wide],
+                )  # fmt: skip
             continue
         o = candidates.step[s, FIRST_STAGE]
         behind = candidates.step[s, LAST_STAGE]

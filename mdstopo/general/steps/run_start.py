@@ -42,14 +42,14 @@ def scene_size(model):
 
 
 @kernel
-def modes_at_start(model, member_state, workspace, q, v, a, lam, most_curved):
+def modes_at_start(model, member_state, workspace, q, v, a, lam, most_knotted):
     """Set the modes and permanent sets at the start: by elongation, then by its rate, then by its second derivative.
 
     The last is that of a balance with the modes that elongations and rates tell.
 
     Constant:
       model: the compiled scene.
-      most_curved: up to how many members with curves steps end at the knots of these (`members.set_modes`).
+      most_knotted: up to how many members with curves steps end at the knots of these (`members.set_modes`).
     In place:
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       q (n_q,), v (n,): the start; driven parts are put in place.
@@ -64,7 +64,7 @@ def modes_at_start(model, member_state, workspace, q, v, a, lam, most_curved):
     second = np.zeros((n_pair, freedoms(model)))
     relative_pose(model, q, v, rel)
     for attempt in range(2):
-        set_modes(model, member_state, rel, second, most_curved)
+        set_modes(model, member_state, rel, second, most_knotted)
         if attempt == 0:
             singular = solve_accelerations(
                 model, member_state, np.int64(0), model.times[0], q, v, np.bool_(False), workspace, a, lam

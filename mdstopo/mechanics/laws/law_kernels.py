@@ -48,8 +48,8 @@ class Modes:
     degree: of a law whose force in a mode is a polynomial in x of this degree at most, and a constant times xd, and
     whose energy is one in x of the next degree: 1 to 3; None where that is not so, or not known. Of such a
     law the margin of a mode is the lesser of at most two linear functions of elongation and rate, and knows no time.
-    pieces: whether modes are pieces of one function that is smooth enough for motion and derivatives, so that only the
-    accuracy of steps gains where they end at the end of a mode.
+    pieces: whether modes are pieces of one function whose stiffness is continuous: steps may pass over the end of a
+    mode, and then lose accuracy, derivatives most of all (`general.dynamics.members.knotted_at`).
     """
 
     margin: Function

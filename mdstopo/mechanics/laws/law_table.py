@@ -207,7 +207,7 @@ def law_degree(code):
 
 @chosen(LISTED, lambda each: (each.modes is not None and each.modes.pieces) or None, inline)
 def law_has_pieces(code):
-    """Whether modes are pieces of one smooth function: steps need not end where a mode does."""
+    """Whether modes are pieces of one function with a continuous stiffness: steps need not end where a mode does."""
     return False
 
 
