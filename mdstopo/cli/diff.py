@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 #: keys that are told; more is counted
 MOST = 40
+#: members that only one result has, of which it is told which they are
+FEW = 8
 
 
 @click.command("diff")
@@ -24,7 +26,8 @@ MOST = 40
 def command(first_path: Path, second_path: Path, picture: Path | None, dark: bool, as_json: bool, quiet: bool) -> int:
     """Say what differs between two results: case, outcome, objectives, constraints, design.
 
-    Members are compared by the places of their ends, so that cases with other points or groups can be compared.
+    Members are compared by their groups and the places of their ends, so that cases with other points or groups can be
+    compared, and final designs whose members have other numbers.
     Of a front it is the point in the middle. The exit status is 0 whether they differ or not.
     \f
     Arguments, which --help leaves out:
@@ -77,6 +80,8 @@ def _say(output: Output, title: str, pairs: "list[Pair]") -> None:
 def _short(value: Any) -> str:
     if value is None:
         return "(not there)"
+    if isinstance(value, dict):
+        return "(there)"
     text = number(value) if isinstance(value, float) else str(value)
     return text if len(text) <= 48 else f"{text[:45]}..."
 
@@ -99,6 +104,9 @@ def _design_rows(own: "Designs") -> list[list[str]]:
     rows += [["absent -> present", str(own.appeared)], ["present -> absent", str(own.vanished)]]
     if own.largest is not None and own.changed:
         rows.append(["largest change", f"{own.largest[0]:+.6g}, of {own.largest[1]}"])
-    if own.only_first or own.only_second:
-        rows += [["only in the first", str(own.only_first)], ["only in the second", str(own.only_second)]]
+    for title, members in (("only in the first", own.members_first), ("only in the second", own.members_second)):
+        if own.only_first or own.only_second:
+            rows.append([title, str(len(members))])
+        rows += [["", words] for words in members[:FEW]]
+        rows += [["", f"and {len(members) - FEW} more"]] if len(members) > FEW else []
     return rows

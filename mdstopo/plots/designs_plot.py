@@ -1,14 +1,13 @@
 """Two designs side by side: start and final of a result, or those of two results with what differs."""
 
-import re
 from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import Case
 from mdstopo.plots.beside import side_places
 from mdstopo.plots.member_lines import NARROWEST, add_lines, widest_of
 from mdstopo.plots.panels import ABOVE, BELOW, LEFT, RIGHT, add_panel, fitted
+from mdstopo.plots.same_members import same_members
 from mdstopo.plots.scenery import start_state
 from mdstopo.plots.slack import member_lines
 from mdstopo.plots.source import Floats, Source
@@ -42,6 +41,8 @@ def draw(module: Any, source: Source) -> Any:
 def draw_pair(module: Any, first: Source, second: Source, titles: tuple[str, str]) -> Any:
     """Both designs, and below them the members of which there is more in the one or in the other."""
     stages = [Stage(source, start_state(source.case)[None]) for source in (first, second)]
+    if first.case.dimension == second.case.dimension:  # what is compared has one scale
+        Stage.show_alike(stages)
     figure, axes, inches = _panels(module, stages, 2)
     for axis, stage, title in zip(axes[0], stages, titles, strict=True):
         stage.draw(axis, start_state(stage.case), thickness(stage.source), (None, None), inches)
@@ -71,12 +72,10 @@ def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -
     thick = thickness(source)
     blank = Thickness(tuple(np.zeros_like(share) for share in thick.shares), "")
     stage.draw(axis, q, blank, (None, None), inches, faint=0.5)
-    named = _names(case) & _names(other.case)
-    known: dict[tuple[Any, ...], float] = {}
-    for key, share in _by_ends(other, named):
-        known[key] = max(share, known.get(key, 0.0))
-    every = np.array([share - known.get(key, 0.0) for key, share in _by_ends(source, named)])
-    more = np.split(every, np.cumsum([len(group) for group in case.members])[:-1])
+    every, its = (np.concatenate([*each.shares, np.zeros(0)]) for each in (thick, thickness(other)))
+    pairs = np.array(same_members(case, other.case), dtype=np.intp).reshape(-1, 2)
+    every[pairs[:, 0]] -= its[pairs[:, 1]]
+    more = np.split(every, np.cumsum([len(group) for group in case.members]))[:-1]
     drawn = [np.flatnonzero((rise > LEAST) | (share > FAINT)) for rise, share in zip(more, thick.shares, strict=True)]
     widest = widest_of(int((every > LEAST).sum()))
     for group, some, side, rise in zip(case.members, drawn, side_places(case, drawn), more, strict=True):
@@ -85,27 +84,3 @@ def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -
         add_lines(axis, lines[~is_more], side[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
         widths = NARROWEST + widest * rise[some][is_more]
         add_lines(axis, lines[is_more], side[is_more], widest, colors=colour, linewidths=widths, zorder=2.4)
-
-
-def _names(case: Case) -> set[str]:
-    """What groups of a case may be called in another: by their names, or without the number of a final design."""
-    return {name for group in case.members for name in (group.name, _plain(group.name))}
-
-
-def _plain(name: str) -> str:
-    """The name of a group, without the number that one of a final design has, whose groups are single members."""
-    return re.sub(r"_\d+$", "", name)
-
-
-def _by_ends(source: Source, named: set[str]) -> list[tuple[tuple[Any, ...], float]]:
-    """Members by bodies, ends and group, with their thickness. A group goes by its name where both results know it
-    (`named`), so that belt_1 is not belt_2, else by its name without a number, else by none."""
-    found = []
-    for group, share in zip(source.case.members, thickness(source).shares, strict=True):
-        ends = np.concatenate([group.from_world[group.from_index], group.to_world[group.to_index]], axis=1)
-        name = next((name for name in (group.name, _plain(group.name)) if name in named), "")
-        found += [
-            ((name, group.body_from, group.body_to, *np.round(end, 9).tolist()), float(s))
-            for end, s in zip(ends, share, strict=True)
-        ]
-    return found

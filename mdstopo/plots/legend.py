@@ -18,12 +18,21 @@ SETTING = {"handlelength": 1.7, "handletextpad": 0.6, "columnspacing": 1.0, "ali
 #: lines with a title, and without
 BESIDE, LETTER, LINE, HEAD, EDGE = 0.33, 0.058, 0.15, 0.22, 0.08
 
+#: what else than bodies and groups may be in a legend
+WORDS = frozenset({"contact", "slack", *(glyph.words for glyph in glyphs().values())})
+
+
+def told(kind: str, name: str) -> str:
+    """What a legend calls a body or a group of members: its name, with the word `kind` before it where the name alone
+    would be left out by matplotlib (`_a`) or is that of something else in the legend (`load`)."""
+    return f"{kind} {name}" if name.startswith("_") or name in WORDS else name
+
 
 def legend_names(case: Case, load_case: str | None = None) -> list[str]:
     """What a layout's legend may name, about in its order."""
     groups = dict.fromkeys(families(case))
-    names = [*["contact"] * bool(case.contacts), *(body.name for body in case.bodies)]
-    names += [f"{group}*" for group in groups] if len(groups) <= MOST_NAMED else []
+    names = [*["contact"] * bool(case.contacts), *(told("body", body.name) for body in case.bodies)]
+    names += [f"{told('members', group)}*" for group in groups] if len(groups) <= MOST_NAMED else []
     names += ["slack"] * any(belt_lengths(case, group) is not None for group in case.members)
     return [*names, *{glyphs()[each.kind].words: None for each in symbols(case, load_case)}]
 
@@ -43,8 +52,9 @@ def height_of(count: int, columns: int, title: str | None) -> float:
 
 
 def legend_handles(axis: Any) -> tuple[list[Any], list[str]]:
-    """The entries of a legend, those of symbols last."""
+    """The entries of a legend, those of symbols last: lines whose marker is a shape of its own."""
+    from matplotlib.path import Path
+
     handles, labels = axis.get_legend_handles_labels()
-    words = {glyph.words for glyph in glyphs().values()}
-    order = sorted(range(len(labels)), key=lambda k: labels[k] in words)
+    order = sorted(range(len(labels)), key=lambda k: isinstance(getattr(handles[k], "get_marker", str)(), Path))
     return [handles[k] for k in order], [labels[k] for k in order]

@@ -7,6 +7,7 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.plots.beside import FREE, side_places, sideways
+from mdstopo.plots.legend import told
 from mdstopo.plots.slack import THIN, member_lines
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import MOST_NAMED, colour, ink
@@ -53,8 +54,8 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
         any_slack |= bool(slack.any())
     chosen_from = {each for group, each in zip(case.members, named, strict=True) if group.design}
     for family in order if len(order) <= MOST_NAMED else ():
-        label = family if family in chosen_from or not chosen_from else f"{family}*"
-        axis.plot([], [], "-", color=colour(order.index(family)), label=label)
+        star = "" if family in chosen_from or not chosen_from else "*"
+        axis.plot([], [], "-", color=colour(order.index(family)), label=f"{told('members', family)}{star}")
     if any_slack:
         axis.plot([], [], color=ink("middle"), linewidth=0.8, linestyle=HANGING, label="slack")
 

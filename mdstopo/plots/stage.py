@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import GROUND
+from mdstopo.case.model import GROUND, Case
 from mdstopo.plots.cloud import planar_cloud, scene_cloud
 from mdstopo.plots.drawn_plane import draw_bodies, draw_state, marks_of
 from mdstopo.plots.member_lines import draw_members
@@ -47,24 +47,25 @@ class Stage:
             self._places = scene_cloud(self.case, states, self.solids)
         else:
             self._places = planar_cloud(self.case, states)
-        self._look_at(self._places)
+        self._look_at(self._places, self.case)
 
-    def _look_at(self, places: Floats) -> None:
-        """Show so much that places (n, d) of the scene are seen, in space from an eye before their middle."""
+    def _look_at(self, places: Floats, upright: Case) -> None:
+        """Show so much that places (n, d) of the scene are seen, in space from an eye before their middle, with up as in
+        the case `upright`."""
         self._windows.clear()
         if self.case.dimension == 3:
             low, high = places.min(axis=0), places.max(axis=0)
             self.radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-12)
-            self.view = views(self.case, 0.5 * (low + high), self.radius)["perspective"]
+            self.view = views(upright, 0.5 * (low + high), self.radius)["perspective"]
         self.cloud = self.seen(places)
 
     @staticmethod
     def show_alike(stages: "list[Stage]") -> None:
-        """Give stages one window, in space from one eye, in which all that each of them draws is whole."""
+        """Give stages one window, in space from the eye of the first, in which all that each of them draws is whole."""
         places = np.concatenate([stage._places for stage in stages])
         for stage in stages:
             stage._together = stages
-            stage._look_at(places)
+            stage._look_at(places, stages[0].case)
 
     def window(self, inches: Floats) -> tuple[Floats, Floats]:
         """Lower left and upper right corner (2,) on the paper of what is seen in a picture of this size (2,)."""

@@ -42,6 +42,7 @@ _SETTINGS: dict[str, Any] = {
     "figure.constrained_layout.use": True,
     "svg.hashsalt": "mdstopo",
     "svg.fonttype": "none",
+    "text.parse_math": False,  # names of files may have dollars
     "savefig.dpi": DPI,
 }
 

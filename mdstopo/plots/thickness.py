@@ -1,7 +1,6 @@
 """How thick each member is drawn: by its design value, or in a final design by its largest force or its law."""
 
 import itertools
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Case
 from mdstopo.plots.member_forces import forces_of
+from mdstopo.plots.same_members import family
 from mdstopo.plots.scenery import Floats, sizes
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import MOST_NAMED
@@ -123,7 +123,7 @@ def families(case: Case) -> list[str]:
     names = [group.name for group in case.members]
     if len(names) <= MOST_NAMED:
         return names
-    return [re.sub(r"_\d+$", "", name) for name in names]
+    return [family(name) for name in names]
 
 
 def strongest(shares: tuple[Floats, ...], most: int) -> list[NDArray[np.int64]]:

@@ -244,6 +244,37 @@ def test_names_in_a_legend_are_whole() -> None:
     assert box.y0 >= axis.get_window_extent().y1
 
 
+@pytest.mark.parametrize("text", [EDGES, IN_SPACE])
+def test_a_body_called_as_a_symbol_is_told_from_it_and_stands_among_the_bodies(text: str) -> None:
+    from mdstopo.plots.style import styled
+
+    named = text.replace("  a:", "  load:").replace("{a:", "{load:").replace("body: a", "body: load")
+    named = named.replace("ground, a]", "ground, load]").replace("belts:", "_belts:").replace("chains:", "slack:")
+    with styled() as module:
+        plain, other = (draw(module, source_of(each)).legends[0].get_texts() for each in (text, named))
+    calls = {"a": "body load", "belts": "members _belts", "chains": "members slack"}
+    assert [each.get_text() for each in other] == [calls.get(each.get_text(), each.get_text()) for each in plain]
+    assert other[-1].get_text() == "load"
+
+
+@pytest.mark.parametrize("text", [EDGES, IN_SPACE])
+def test_two_results_are_compared_at_one_scale_in_one_window(text: str) -> None:
+    from mdstopo.plots.designs_plot import draw_pair
+    from mdstopo.plots.style import styled
+
+    other = text.replace("position: [4, 0.3]", "position: [6, -2]").replace(
+        "position: [0, 0, 0]", "position: [1, 0, 3]"
+    )
+    other = other.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
+    with styled() as module:
+        figure = draw_pair(module, source_of(text), source_of(other), ("first", "second"))
+    assert len(figure.axes) == 4
+    for limits in ("get_xlim", "get_ylim"):
+        assert len({getattr(axis, limits)() for axis in figure.axes}) == 1
+    sizes = np.array([axis.get_position().size for axis in figure.axes])
+    assert sizes == pytest.approx(np.tile(sizes[0], (4, 1)), rel=1e-12)
+
+
 def test_a_moving_svg_dashes_belts_while_they_are_slack_and_shows_what_is_touched() -> None:
     from mdstopo.plots.animation import _svg
     from mdstopo.plots.thickness import Thickness
