@@ -50,8 +50,8 @@ class Stage:
         self._look_at(self._places, self.case)
 
     def _look_at(self, places: Floats, upright: Case) -> None:
-        """Show so much that places (n, d) of the scene are seen, in space from an eye before their middle, with up as in
-        the case `upright`."""
+        """Show so much that places (n, d) are seen, in space from an eye before their middle, where up is as in the case
+        `upright`."""
         self._windows.clear()
         if self.case.dimension == 3:
             low, high = places.min(axis=0), places.max(axis=0)

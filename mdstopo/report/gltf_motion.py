@@ -4,10 +4,12 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from mdstopo._version import __version__
-from mdstopo.case.model import GROUND, Case
+from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.plots.beside import side_places
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.scenery import Floats, ends_at, start_state
 from mdstopo.plots.solids import Solid, convex, joined, solid
@@ -28,6 +30,10 @@ TURN, FEWEST, LONGEST = 0.2, 121, 4001
 SMOOTH = 0.8
 #: shares of the scene's size: radius of the thickest member, of the thinnest, and of joints
 THICK, THIN, JOINT = 0.006, 0.001, 0.012
+#: share of the scene's size between the axes of members of the same two points: the thickest do not touch
+BESIDE = 2.5 * THICK
+#: below this share of its length a member is seen end on
+END_ON = 0.2
 #: sides of a member's tube; corners up to which faces are cut from one corner
 SIDES, FAN = 8, 4
 _UP = np.array([0.0, 1.0, 0.0])
@@ -166,20 +172,17 @@ class _Scene:
         shares, named = thickness(self.source).shares, families(self.case)
         order = list(dict.fromkeys(named))
         some = strongest(shares, MOST)
-        for group, share, chosen, family in zip(self.case.members, shares, some, named, strict=True):
+        every = zip(self.case.members, shares, some, side_places(self.case, some), named, strict=True)
+        for group, share, chosen, side, family in every:
             if not len(chosen):
                 continue
             own = COLOURS[order.index(family) % len(COLOURS)]
             primitive = self._faces(_tube(), self._material(own, 1.0))
             mesh = self.out.add("meshes", name=group.name, primitives=[primitive])
             radius = self.size * (THIN + (THICK - THIN) * share)
-            first = _stretched(
-                _lifted(self.case, ends_at(self.case, group, self.first.q[0]))[None, chosen], radius[chosen]
-            )
-            moved = {}
-            for name, poses in self.motions.items():
-                ends = np.stack([ends_at(self.case, group, q)[chosen] for q in poses.q])
-                moved[name] = _stretched(_lifted(self.case, ends), radius[chosen])
+            drawn = (chosen, radius[chosen], BESIDE * self.size * side)
+            first = self._tubes(group, drawn, self.first.q)
+            moved = {name: self._tubes(group, drawn, poses.q) for name, poses in self.motions.items()}
             for i, member in enumerate(chosen.tolist()):
                 place, turn, scale = (part[0, i] for part in first)
                 node = self.out.add(
@@ -193,6 +196,17 @@ class _Scene:
                 }
         there = sum(int((share > FAINT).sum()) for share in shares)
         return nodes, there - sum(len(chosen) for chosen in some)
+
+    def _tubes(
+        self, group: MemberGroup, drawn: tuple[NDArray[np.int64], Floats, Floats], states: Floats
+    ) -> tuple[Floats, Floats, Floats]:
+        """What makes tubes of members at states (T, n), as `_stretched`. drawn: of a group the members (M,), their
+        radii, and by how much each is beside the line between its ends."""
+        chosen, radius, shift = drawn
+        ends = _lifted(self.case, np.stack([ends_at(self.case, group, q)[chosen] for q in states]))
+        if np.any(shift):
+            ends = ends + (shift[:, None] * _sideways(ends, _toward(self.case)))[:, :, None]
+        return _stretched(ends, radius)
 
     def _animation(self, name: str, poses: Poses) -> None:
         if len(poses.t) < 2:
@@ -311,6 +325,41 @@ def _standing(case: Case) -> Floats:
         return np.array([1.0, 0.0, 0.0, 0.0])
     right, away, up = upright(case)
     return quaternions_of(np.array([right, up, -away]))
+
+
+def _toward(case: Case) -> Floats:
+    """Unit vector to an eye that sees members beside each other: before a plane, in space in front of and above it."""
+    if case.dimension == 2:
+        return np.array([0.0, 0.0, 1.0])
+    _, away, up = upright(case)
+    return np.asarray((up - away) / np.sqrt(2.0))
+
+
+def _left(along: Floats, toward: Floats) -> Floats:
+    """(M, 3) at right angles to unit vectors along members, to the left as an eye in the direction `toward` sees them;
+    where this eye sees one end on, as another eye does."""
+    left = np.cross(toward, along)
+    end_on = np.linalg.norm(left, axis=1) < END_ON
+    left[end_on] = np.cross(np.roll(toward, 1), along[end_on])
+    return left
+
+
+def _sideways(ends: Floats, toward: Floats) -> Floats:
+    """(T, M, 3) unit vectors at right angles to members with ends (T, M, 2, 3): of `_left` at the first of the times,
+    then turned with the members as little as these turn. Zero until a member has a length."""
+    way = ends[:, :, 1] - ends[:, :, 0]
+    length = np.linalg.norm(way, axis=2, keepdims=True)
+    along = way / np.where(length > 0.0, length, 1.0)
+    left = np.zeros_like(way[0])
+    found = np.empty_like(way)
+    for k, each in enumerate(along):
+        left = left - (left * each).sum(axis=1, keepdims=True) * each
+        lost = ~left.any(axis=1)
+        left[lost] = _left(each[lost], toward)
+        size = np.linalg.norm(left, axis=1, keepdims=True)
+        left = left / np.where(size > 0.0, size, 1.0)
+        found[k] = left
+    return found
 
 
 def _stretched(ends: Floats, radius: Floats) -> tuple[Floats, Floats, Floats]:

@@ -78,8 +78,8 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     frame();
   };
   // the scale and the place at which all is seen from where the eye is, with room for symbols and names; the user's
-  // moves and zoom come on top of them. A long scene that is seen from its end is not drawn so large that it leaves the
-  // view at once as it turns.
+  // moves and zoom come on top of them. It is chosen anew while the scene turns, so that this never leaves the view; a long
+  // scene that is seen from its end is not drawn so large that it shrinks much as it turns.
   const frame = () => {
     aim();
     if (!cloud.length) return;
@@ -193,7 +193,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     camera.zoom = next;
   };
   let asked = false; // many moves of the mouse, one picture
-  const again = () => { if (!asked) { asked = true; requestAnimationFrame(() => { asked = false; redraw(); }); } };
+  const again = () => { if (!asked) { asked = true; requestAnimationFrame(() => { asked = false; frame(); redraw(); }); } };
 
   const fingers = new Map();
   const between = (a, b) => [[(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], Math.hypot(a[0] - b[0], a[1] - b[1])];
@@ -209,7 +209,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     } else if (event.shiftKey || (event.buttons & 6)) { camera.x += now[0] - last[0]; camera.y += now[1] - last[1]; } else turn(now[0] - last[0], now[1] - last[1]);
     again();
   });
-  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => { fingers.delete(event.pointerId); frame(); again(); });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(-0.0015 * event.deltaY), inside(event)); again(); }, { passive: false });
   canvas.addEventListener("dblclick", () => { look("perspective"); redraw(); });

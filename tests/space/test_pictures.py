@@ -18,7 +18,7 @@ from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.thickness import thickness
 from mdstopo.plots.views import upright, views
 from mdstopo.report import report_content
-from mdstopo.report.gltf_motion import motion_file
+from mdstopo.report.gltf_motion import _sideways, motion_file
 from mdstopo.report.report_page import page
 from mdstopo.scene.point_positions import point_rates, points_at
 from mdstopo.scene.quaternions import quaternions_of
@@ -330,6 +330,9 @@ def test_a_long_scene_stays_in_the_view_where_it_is_turned_from_its_end(source, 
     assert (places >= 0.0).all()
     assert (places <= [760.0, 560.0]).all()
     assert np.ptp(places[:, 0]) > 380.0
+    # while it is turned, too, before the mouse is let go
+    turning = [each["path"] for each in in_node(place)["seen"]["turning from the side"] if each["kind"] == "area"]
+    assert np.concatenate(turning) == pytest.approx(places)
 
 
 @pytest.mark.skipif(NODE is None, reason="no node on this machine")
@@ -341,7 +344,9 @@ def test_the_scene_turns_under_the_mouse_and_moves_with_the_slider(source, writt
     assert pictures["back"] == pictures["perspective"]
     # another design or load case does not undo what the user has moved and zoomed
     assert pictures["chosen again"] == pictures["moved"]
-    assert len(set(pictures.values())) == len(pictures) - 2
+    # what is turned is shown as large as it is when the mouse is let go
+    assert pictures["turning from the side"] == pictures["turned from the side"]
+    assert len(set(pictures.values())) == len(pictures) - 3
     assert all(np.isfinite(each["path"]).all() for drawn in seen.values() for each in drawn)
     case, start = source.case, start_state(source.case)
     corners = points_at(case, "hull", solid(case, "hull").corners, start[None])[0]
@@ -391,6 +396,52 @@ def test_the_exported_motion_is_gltf_and_is_the_motion(source):
         assert tip == pytest.approx(ends[:, 1], abs=2e-4)
     slow = Gltf(motion_file(source, slower=10.0)[0])
     assert slow.track(0, hull, "translation")[0][-1] == pytest.approx(20.0)
+
+
+def tubes(found, name):
+    """(T, 2, 3) ends of the axis of a member's tube."""
+    node = found.node(name)
+    foot, turn, scale = (found.track(0, node, path)[1] for path in ("translation", "rotation", "scale"))
+    tip = foot + Rotation.from_quat(turn).apply(np.outer(scale[:, 1], [0.0, 1.0, 0.0]))
+    return np.stack([foot, tip], axis=1)
+
+
+def test_exported_members_of_the_same_two_points_lie_beside_each_other_at_all_times(source):
+    law = "law: {type: spring, stiffness: 800}}"
+    text = CASE.replace("objectives:", f"  doubles: {{from: posts, to: corners, {law}\nobjectives:")
+    text = text.replace("count: [2, 2]}}}", "count: [2, 2]}}}\n  tip: {body: ball, grid: {list: [[1, 0.5, 1]]}}")
+    text = text.replace("  doubles", f"  alone: {{from: corners, to: tip, {law}\n  doubles")
+    case = read_case(text)
+    own = {"case": case, "alpha": np.ones(case.n_design), "design": np.ones(case.n_design)}
+    found = Gltf(motion_file(SimpleNamespace(**{**vars(source), **own}))[0])
+    t = found.track(0, found.node("hull"), "translation")[0].astype(np.float64)
+    q = states(case, t)[0]
+    lashings, alone, doubles = case.members
+    exact = np.stack([ends_at(case, alone, each)[3] for each in q])
+    assert tubes(found, "alone 3") == pytest.approx(exact, abs=2e-4)
+    for corner, post in ((0, 0), (4, 3)):
+        (one,) = np.flatnonzero((lashings.from_index == corner) & (lashings.to_index == post))
+        (other,) = np.flatnonzero((doubles.from_index == post) & (doubles.to_index == corner))
+        first, second = tubes(found, f"lashings {one}"), tubes(found, f"doubles {other}")[:, ::-1]
+        exact = np.stack([ends_at(case, lashings, each)[one] for each in q])
+        assert 0.5 * (first + second) == pytest.approx(exact, abs=2e-4)
+        gap = first - second
+        radius = found.track(0, found.node(f"lashings {one}"), "scale")[1][:, 0]
+        assert gap[:, 0] == pytest.approx(gap[:, 1], abs=1e-5)
+        apart = np.linalg.norm(gap[:, 0], axis=1)
+        assert apart == pytest.approx(np.full(len(t), 2.5 * radius[0]), rel=1e-3)
+        along = exact[:, 1] - exact[:, 0]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        assert np.abs((gap[:, 0] * along).sum(axis=1)).max() < 1e-3 * apart[0]
+        # from one frame to the next they turn around each other no more than the member turns
+        turned = np.linalg.norm(np.diff(along, axis=0), axis=1)
+        assert (np.linalg.norm(np.diff(gap[:, 0], axis=0), axis=1) <= (turned + 2e-3) * apart[0]).all()
+
+
+def test_exported_members_without_a_length_lie_beside_each_other_once_they_have_one():
+    ends = np.zeros((3, 1, 2, 3))
+    ends[1:, 0, 1] = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
+    assert _sideways(ends, np.array([0.0, 0.0, 1.0]))[:, 0].tolist() == [[0, 0, 0], [0, 1, 0], [-1, 0, 0]]
 
 
 IN_BROWSER = Path(__file__).with_name("page_in_browser.js")
