@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import CASES
 from mdstopo import load_case, optimize, simulate
-from mdstopo.plots.scenery import PRESENT, ends_at, hull, points_of, sizes, start_state
+from mdstopo.plots.body_shapes import planar_shapes
+from mdstopo.plots.scenery import PRESENT, ends_at, sizes, start_state
 from mdstopo.plots.style import COLOURS
 from mdstopo.scene.point_positions import points_at
 
@@ -36,16 +37,18 @@ def draw_moving(path: Path) -> None:
     times = np.linspace(motion.t[0], motion.t[-1], FRAMES)
     states = motion.at(times).q
     kept = sizes(group, result.alpha) > PRESENT
-    bodies = [(body.name, hull(points_of(case, body.name))) for body in case.bodies]
-    colours = {name: COLOURS[(k + 2) % len(COLOURS)] for k, (name, _) in enumerate(bodies)}
     slower = SLOW / float(times[-1] - times[0])
 
     def outlines(moving: bool) -> list[str]:
         parts = []
-        for name, corners in bodies:
-            places = points_at(case, name, corners, states if moving else start_state(case)[None])
-            shape = [f"{_path(each[None])}Z" for each in places]
-            parts.append(_drawn(shape, f'fill="{colours[name]}" fill-opacity=".14" stroke="{colours[name]}"'))
+        for k, body in enumerate(case.bodies):
+            colour = COLOURS[(k + 2) % len(COLOURS)]
+            for shape in planar_shapes(case, body.name):
+                lines = [(area, f'fill="{colour}" fill-opacity=".14"', "Z") for area in shape.areas]
+                lines += [(line, 'fill="none" stroke-width="2"', "") for line in shape.lines]
+                for corners, style, end in lines:
+                    places = points_at(case, body.name, corners, states if moving else start_state(case)[None])
+                    parts.append(_drawn([_path(each[None]) + end for each in places], f'{style} stroke="{colour}"'))
         return parts
 
     thin = f'fill="none" stroke="{COLOURS[0]}" stroke-width=".4" stroke-opacity=".35"'

@@ -1,30 +1,23 @@
-"""A motion as moving pictures: GIF and MP4 from drawings, SVG whose lines move by themselves."""
+"""A motion as moving pictures: GIF and MP4 from drawings, SVG that moves by itself."""
 
 import shutil
-from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mdstopo.plots.beside import FREE, side_places, sideways
-from mdstopo.plots.body_shapes import planar_shapes
-from mdstopo.plots.member_lines import MOST, NARROWEST, widest_of
+from mdstopo.plots.moving_svg import Timing, moving_svg
 from mdstopo.plots.panels import ABOVE, BELOW, LEFT, RIGHT, add_panel
-from mdstopo.plots.scenery import Floats, edge_at, start_state
-from mdstopo.plots.slack import CORNERS, DASHES, belt_lengths, member_lines
+from mdstopo.plots.scenery import Floats, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.stage import Stage
-from mdstopo.plots.style import WIDTH, colour, ink, paper
-from mdstopo.plots.surface_lines import surfaces_of
-from mdstopo.plots.thickness import Thickness, families, strongest, thickness
-from mdstopo.scene.point_positions import points_at
+from mdstopo.plots.style import WIDTH
+from mdstopo.plots.thickness import Thickness, thickness
 from mdstopo.store.store_errors import StoreError
 
 FORMATS = (".gif", ".mp4", ".svg")
-#: dots per inch of a frame, pixels of an SVG across, frames in a second at most
-DPI, PIXELS, RATE = 150, 720, 25
+#: dots per inch of a frame, frames in a second at most
+DPI, RATE = 150, 25
 #: inches: a frame, and the drawing in it
 FRAME = np.array([1.3 * WIDTH, WIDTH])
 FILM = FRAME - np.array([LEFT + RIGHT, BELOW + ABOVE])
@@ -54,7 +47,7 @@ def write_motion(module: Any, source: Source, path: Path, load_case: str, frames
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if ending == ".svg":
-            path.write_text(_svg(stage, thick, times, motion.q, seconds), encoding="utf-8")
+            path.write_text(moving_svg(stage, thick, motion.q, Timing(load_case, times, seconds)), encoding="utf-8")
         else:
             _film(module, stage, thick, (load_case, times, motion.q), (path, seconds))
     except OSError as error:
@@ -64,7 +57,7 @@ def write_motion(module: Any, source: Source, path: Path, load_case: str, frames
 def still(source: Source) -> str:
     """The design of a result at the start of its motion, as SVG. Raises StoreError where the file has none."""
     states = start_state(source.case)[None]
-    return _svg(Stage(source, states), thickness(source), None, states, 1.0)
+    return moving_svg(Stage(source, states), thickness(source), states)
 
 
 def _film(
@@ -87,109 +80,3 @@ def _film(
             stage.draw(axis, q, thick, (load_case, t), FILM)
             axis.set_title(f"t = {t:.4g} s", loc="left")
             writer.grab_frame()
-
-
-def _svg(stage: Stage, thick: Thickness, times: Floats | None, states: Floats, seconds: float) -> str:
-    """Lines whose corners are animated (SMIL), without a script."""
-    low, high = stage.cloud.min(axis=0), stage.cloud.max(axis=0)
-    room = 0.06 * max(float((high - low).max()), 1e-9)
-    size = high - low + 2.0 * room
-    scale = PIXELS / float(size[0])
-    height = scale * float(size[1]) + 24.0
-    shift = np.array([room - low[0], room + high[1]])
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {PIXELS} {height:.0f}">',
-        f"<title>{escape(stage.source.title)}</title>",
-        f'<rect width="{PIXELS}" height="{height:.0f}" fill="{paper()}"/>',
-    ]
-    for each in _lines(stage, thick, states):
-        flat = np.stack([each.places[..., 0] + shift[0], shift[1] - each.places[..., 1]], axis=-1) * scale
-        flat += each.beside * np.array([1.0, -1.0])
-        words = [" ".join(f"{x:.1f},{y:.1f}" for x, y in frame) for frame in flat.tolist()]
-        move = _animated("points", words, seconds) + _animated("stroke-dasharray", each.dashes, seconds, "discrete")
-        dashes = f' stroke-dasharray="{each.dashes[0]}"' if each.dashes else ""
-        parts.append(f'<polyline points="{words[0]}" {each.style}{dashes}>{move}</polyline>')
-    if times is None:
-        return "\n".join([*parts, "</svg>\n"])
-    slower = seconds / max(times[-1] - times[0], 1e-300)
-    pace = f"{slower:.3g} times slower" if slower >= 1.0 else f"{1.0 / slower:.3g} times faster"
-    parts.append(
-        f'<text x="8" y="{height - 8:.0f}" font-family="sans-serif" font-size="13" fill="{ink()}">'
-        f"{times[0]:.4g} s to {times[-1]:.4g} s, {pace}</text>"
-    )
-    return "\n".join([*parts, "</svg>\n"])
-
-
-def _animated(name: str, values: list[str], seconds: float, mode: str = "linear") -> str:
-    """An animation of an attribute, where its values change."""
-    if len(set(values)) < 2:
-        return ""
-    every = ";".join(values)
-    how = "" if mode == "linear" else f' calcMode="{mode}"'
-    return f'<animate attributeName="{name}" dur="{seconds:g}s" repeatCount="indefinite"{how} values="{every}"/>'
-
-
-@dataclass(frozen=True)
-class _Line:
-    """A line that moves. style: its attributes; places (T, n, 2): its corners on the paper; beside: pixels (T, 1, 2)
-    by which it is shifted to the right and up; dashes: of each state, where some are dashed."""
-
-    style: str
-    places: Floats
-    beside: Floats | float = 0.0
-    dashes: list[str] = field(default_factory=list)
-
-
-def _lines(stage: Stage, thick: Thickness, states: Floats) -> list[_Line]:
-    """Everything that is drawn."""
-    case, found = stage.case, _touched(stage, states)
-    for k, name in enumerate(stage.names):
-        own = ink("middle") if name == stage.names[-1] else colour(k + 2)
-        for corners, closed, wide in _body_lines(stage, name):
-            flat = _flat(stage, name, corners, states)
-            fill = f'fill="{own}" fill-opacity="0.13"' if closed else 'fill="none"'
-            found.append(_Line(f'{fill} stroke="{own}" stroke-width="{wide}" stroke-linejoin="round"', flat))
-    chosen, named = strongest(thick.shares, MOST), families(case)
-    dashed = " ".join(map(str, DASHES))
-    order, widest = list(dict.fromkeys(named)), 1.4 * widest_of(sum(len(each) for each in chosen))
-    every = zip(case.members, thick.shares, chosen, side_places(case, chosen), named, strict=True)
-    for group, share, some, side, family in every:
-        drawn = [member_lines(case, group, q, stage.seen, some) for q in states]
-        ends = slice(None) if belt_lengths(case, group) is not None else slice(None, None, CORNERS - 1)
-        places, slack = np.array([line for line, _ in drawn])[:, :, ends], np.array([hangs for _, hangs in drawn])
-        for i, member in enumerate(some.tolist()):
-            width = NARROWEST + (widest - NARROWEST) * float(share[member])
-            style = f'fill="none" stroke="{colour(order.index(family))}" stroke-width="{width:.2f}"'
-            beside = (widest + FREE) * sideways(places[:, i], np.full(len(states), side[i]))[:, None]
-            dashes = [dashed if hangs else "none" for hangs in slack[:, i]] if slack[:, i].any() else []
-            found.append(_Line(style, places[:, i], beside, dashes))
-    return found
-
-
-def _touched(stage: Stage, states: Floats) -> list[_Line]:
-    """Edges and surfaces that points may come against."""
-    case = stage.case
-    if case.dimension == 2:
-        edges = [np.array([edge_at(case, contact, q) for q in states]) for contact in case.contacts]
-    else:
-        edges = [_flat(stage, each.body, line, states) for each in surfaces_of(case) for line in each.lines]
-    wide = 1.4 if case.dimension == 2 else 0.6
-    return [_Line(f'fill="none" stroke="{ink("middle")}" stroke-width="{wide}"', edge) for edge in edges]
-
-
-def _flat(stage: Stage, body: str, corners: Floats, states: Floats) -> Floats:
-    """Places (T, n, 2) on the paper of corners (n, d) of a body."""
-    return np.asarray(stage.seen(points_at(stage.case, body, corners, states)))
-
-
-def _body_lines(stage: Stage, name: str) -> list[tuple[Floats, bool, float]]:
-    """Lines (n, d) of a body, whether their area is filled, and how wide they are."""
-    if stage.case.dimension == 3:
-        shape = stage.solids[name]
-        return [(shape.corners[list(edge)], False, 1.0 if shape.faces else 2.0) for edge in shape.edges]
-    found: list[tuple[Floats, bool, float]] = []
-    for shape2 in planar_shapes(stage.case, name):
-        found += [(np.concatenate([area, area[:1]]), True, 1.0) for area in shape2.areas]
-        found += [(line, False, 2.0) for line in shape2.lines]
-        found += [(arm, False, 1.0 if shape2.thin_arms else 2.6) for arm in shape2.arms]
-    return found

@@ -13,7 +13,7 @@ from mdstopo.plots.scenery import edge_at, own_points
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import colour, ink
 from mdstopo.plots.symbol_marks import Mark, draw_mark, draw_marks, ground_marks, marks_at
-from mdstopo.plots.symbols import symbols
+from mdstopo.plots.symbols import Symbol
 from mdstopo.plots.thickness import Thickness
 from mdstopo.scene.point_positions import points_at
 
@@ -44,10 +44,9 @@ def draw_state(
         draw_gravity(axis, gravity)
 
 
-def marks_of(case: Case, q: Floats, shown: tuple[str | None, float | None], scale: float) -> list[Mark]:
-    """All symbols at a state, those of ground last. shown: a load case, and the time of its loads; scale: points in a
-    metre."""
-    own = marks_at(case, symbols(case, *shown), q, lambda places: places, 1.0)
+def marks_of(case: Case, q: Floats, found: list[Symbol], scale: float) -> list[Mark]:
+    """These symbols at a state, and those of ground, which are last. scale: points in a metre."""
+    own = marks_at(case, found, q, lambda places: places, 1.0)
     return [*own, *ground_marks(_on_ground(case), own, scale)]
 
 

@@ -15,7 +15,7 @@ from mdstopo.plots.source import Source
 from mdstopo.plots.space_layout import draw_perspective, draw_scene
 from mdstopo.plots.style import colour
 from mdstopo.plots.symbol_marks import Mark, draw_marks, marks_at
-from mdstopo.plots.symbols import symbols
+from mdstopo.plots.symbols import Symbol, symbols
 from mdstopo.plots.thickness import Thickness
 from mdstopo.plots.views import views
 from mdstopo.plots.window import scale_of, window
@@ -50,7 +50,7 @@ class Stage:
         self._look_at(self._places, self.case)
 
     def _look_at(self, places: Floats, upright: Case) -> None:
-        """Show so much that places (n, d) are seen, in space from an eye before their middle, where up is as in the case
+        """Show so much that places (n, d) are seen, in space from an eye before their middle, up being as in the case
         `upright`."""
         self._windows.clear()
         if self.case.dimension == 3:
@@ -81,9 +81,13 @@ class Stage:
         return found
 
     def _marks(self, q: Floats, shown: tuple[str | None, float | None], scale: float) -> list[Mark]:
+        return self.marks(q, symbols(self.case, *shown), scale)
+
+    def marks(self, q: Floats, found: list[Symbol], scale: float) -> list[Mark]:
+        """These symbols at a state, in a plane with those of ground. scale: points (1/72 inch) in a metre."""
         if self.case.dimension == 2:
-            return marks_of(self.case, q, shown, scale)
-        return marks_at(self.case, symbols(self.case, *shown), q, self.view.seen, self.radius)
+            return marks_of(self.case, q, found, scale)
+        return marks_at(self.case, found, q, self.view.seen, self.radius)
 
     def draw(
         self,

@@ -83,6 +83,8 @@ def marks_at(
             scale = max(SHORTEST, abs(symbol.size))
         elif symbol.kind in ("motion", "turning"):
             scale = 0.8
+        if symbol.size == 0.0:
+            scale = 0.0
         there = None if end is None else seen(end[None])[0]
         place = seen(at[None])[0]
         marks.append(Mark(glyph, place, there, angle, scale, symbol.size < 0.0, named, symbol.is_tie))

@@ -28,7 +28,7 @@ class Symbol:
     which a line is drawn.
 
     way (d,): where it points, in coordinates of `axes`, a body or ground; zero where it points nowhere. size: of the
-    largest of its kind, negative for a turn that is clockwise in the plane.
+    largest of its kind, negative for a turn that is clockwise in the plane, 0 of a load that does not act.
     """
 
     kind: str
@@ -48,8 +48,14 @@ class Symbol:
 def symbols(case: Case, load_case: str | None = None, time: float | None = None) -> list[Symbol]:
     """Everything that is drawn of a load case, the first where none is named.
 
-    time: at which loads are shown; None shows each at its largest. What stands in several places is there once.
+    time: at which loads are shown, if they act then; None shows each at its largest. What stands in several places is
+    there once.
     """
+    return [each for each in every_symbol(case, load_case, time) if each.size != 0.0]
+
+
+def every_symbol(case: Case, load_case: str | None = None, time: float | None = None) -> list[Symbol]:
+    """The same with loads that do not act at the time, of size 0: so many, in this order, there are at all times."""
     chosen = case.load_cases[0] if load_case is None else case.load_case(load_case)
     return [*_ties(case), *_motions(case, chosen), *_loads(case, chosen, time)]
 
@@ -116,11 +122,10 @@ def _loads(case: Case, chosen: LoadCase, time: float | None) -> Iterator[Symbol]
     }
     for kind, load, value in found:
         size = float(np.linalg.norm(value))
-        if size <= TINY * largest[kind] or size == 0.0:
-            continue
+        acts = size > TINY * largest[kind]
         axes = load.body if load.frame == "body" else GROUND
-        way = value / size if kind == "load" or d == 3 else None
-        share = float(np.copysign(size / largest[kind], value[0] if way is None else 1.0))
+        way = (value / size if acts else np.zeros(d)) if kind == "load" or d == 3 else None
+        share = float(np.copysign(size / largest[kind], value[0] if way is None else 1.0)) if acts else 0.0
         yield Symbol(kind, load.body, np.array(load.at_local), None, way, axes, share)
 
 

@@ -40,7 +40,7 @@ def test_an_svg_moves_its_lines_from_the_first_state_to_the_last(results, tmp_pa
     assert run_group(["animate", str(results["run"]), "--out", str(out), "--frames", "5", "--quiet"]) == 0
     text = out.read_text()
     assert "<script" not in text
-    moves = re.findall(r'values="([^"]*)"', text)
+    moves = re.findall(r'attributeName="points"[^>]* values="([^"]*)"', text.split("<g ")[0])
     assert moves
     assert {len(each.split(";")) for each in moves} == {5}
     first = [each.split(";")[0] for each in moves]

@@ -276,7 +276,7 @@ def test_two_results_are_compared_at_one_scale_in_one_window(text: str) -> None:
 
 
 def test_a_moving_svg_dashes_belts_while_they_are_slack_and_shows_what_is_touched() -> None:
-    from mdstopo.plots.animation import _svg
+    from mdstopo.plots.moving_svg import Timing, moving_svg
     from mdstopo.plots.thickness import Thickness
 
     text = EDGES.replace("  alone:", "  slack:").replace(
@@ -291,11 +291,12 @@ contacts: [{points: foot, on: {body: ground, from: [-1, -0.4], to: [5, -0.4]}, s
     states = np.tile(start_state(source.case), (3, 1))
     states[1:, 3] += 0.5  # pulled taut
     shares = Thickness(tuple(np.ones(len(group)) for group in source.case.members), "")
-    said = _svg(Stage(source, states), shares, np.linspace(0.0, 1.0, 3), states, 4.0)
+    timing = Timing("default", np.linspace(0.0, 1.0, 3), 4.0)
+    said = moving_svg(Stage(source, states), shares, states, timing)
     assert said.count('attributeName="stroke-dasharray"') == 1
     assert 'calcMode="discrete" values="4 3;none;none"' in said
     assert "4 times slower" in said
-    assert said.count("<polyline") == 3 + len(bodies_lines(source)) + 1
+    assert said.split("<g ")[0].count("<polyline") == 3 + len(bodies_lines(source)) + 1
 
 
 def bodies_lines(source: Any) -> list[Any]:
