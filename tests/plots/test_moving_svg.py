@@ -13,6 +13,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.plots.moving_svg import POINT, Timing, moving_svg
 from mdstopo.plots.scenery import Floats, start_state
 from mdstopo.plots.stage import Stage
+from mdstopo.plots.style import ink
 from mdstopo.plots.symbol_marks import marks_at
 from mdstopo.plots.symbols import every_symbol, symbols
 from mdstopo.plots.thickness import Thickness
@@ -101,7 +102,7 @@ def test_symbols_are_where_those_of_still_pictures_are_at_each_time(turning: flo
                     near = [line for _, line in lines if len(line) == len(wanted)]
                     assert min(np.abs(line - wanted).max() for line in near) < 1.0
         assert len(marks) == (3 if t > 1.0 else 2)
-        head, _ = (line for _, line in lines if len(line) == 4)  # the other is that of gravity
+        head, _ = (line for colour, line in lines if len(line) == 4 and colour == ink())  # of the load, of gravity
         assert (np.ptp(head) > 1.0) == (t > 1.0)
 
 
