@@ -17,6 +17,10 @@ SETTING = {"handlelength": 1.7, "handletextpad": 0.6, "columnspacing": 1.0, "ali
 #: inches: a name has so much beside its letters, and so much for each; a line; above the
 #: lines with a title, and without
 BESIDE, LETTER, LINE, HEAD, EDGE = 0.33, 0.058, 0.15, 0.22, 0.08
+#: rows after which it counts that one is a little higher than a line, and by how much, in inches
+ROWS, MORE = 8, 0.01
+#: letters of a name for which there is room; those of its beginning that stay where it is longer
+LONGEST, BEGINNING = 50, 30
 
 #: what else than bodies and groups may be in a legend
 WORDS = frozenset({"contact", "slack", *(glyph.words for glyph in glyphs().values())})
@@ -24,8 +28,10 @@ WORDS = frozenset({"contact", "slack", *(glyph.words for glyph in glyphs().value
 
 def told(kind: str, name: str) -> str:
     """What a legend calls a body or a group of members: its name, with the word `kind` before it where the name alone
-    would be left out by matplotlib (`_a`) or is that of something else in the legend (`load`)."""
-    return f"{kind} {name}" if name.startswith("_") or name in WORDS else name
+    would be left out by matplotlib (`_a`) or is that of something else in the legend (`load`). A name for which there
+    is no room lacks its middle, for names differ most often by their ends."""
+    whole = f"{kind} {name}" if name.startswith("_") or name in WORDS else name
+    return whole if len(whole) <= LONGEST else f"{whole[:BEGINNING]}\u2026{whole[BEGINNING + 1 - LONGEST :]}"
 
 
 def legend_names(case: Case, load_case: str | None = None) -> list[str]:
@@ -48,7 +54,8 @@ def columns_of(names: Sequence[str], width: float, most: int) -> int:
 
 def height_of(count: int, columns: int, title: str | None) -> float:
     """Inches that a legend of so many names in so many columns takes, with its title where it has one."""
-    return (HEAD if title else EDGE) + LINE * -(-count // columns)
+    rows = -(-count // columns)
+    return (HEAD if title else EDGE) + LINE * rows + MORE * max(0, rows - ROWS)
 
 
 def legend_handles(axis: Any) -> tuple[list[Any], list[str]]:

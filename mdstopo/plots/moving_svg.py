@@ -13,7 +13,7 @@ from mdstopo.plots.glyphs import Glyph, glyphs
 from mdstopo.plots.member_lines import MOST, NARROWEST, widest_of
 from mdstopo.plots.panels import fitted
 from mdstopo.plots.scenery import Floats, edge_at
-from mdstopo.plots.slack import CORNERS, DASHES, belt_lengths, member_lines
+from mdstopo.plots.slack import CORNERS, DASHES, THIN, belt_lengths, member_lines
 from mdstopo.plots.stage import Stage
 from mdstopo.plots.style import colour, ink, paper
 from mdstopo.plots.surface_lines import surfaces_of
@@ -57,7 +57,7 @@ def moving_svg(stage: Stage, thick: Thickness, states: Floats, timing: Timing | 
     ]
     seconds = 1.0 if timing is None else timing.seconds
     parts += [_drawn(line, frame, seconds) for line in _lines(stage, thick, states)]
-    parts += _rings(stage, frame, states, seconds)
+    parts += [*_rings(stage, frame, states, seconds), *_centres(stage, frame, states, seconds)]
     shown = [(None, None)] if timing is None else [(timing.load_case, t) for t in timing.times.tolist()]
     marks = [
         stage.marks(q, every_symbol(stage.case, *each), frame.points) for q, each in zip(states, shown, strict=True)
@@ -95,13 +95,14 @@ class _Frame:
 @dataclass(frozen=True)
 class _Line:
     """A line that moves. style: its attributes; places (T, n, 2): its corners on the paper; beside: pixels (T, 1, 2)
-    by which it is shifted to the right and up; dashes: of each state, where some are dashed; ends: numbers of the
+    by which it is shifted to the right and up; dashes, widths: of each state, where these change; ends: numbers of the
     corners at which a loop ends, where it is an area of several."""
 
     style: str
     places: Floats
     beside: Floats | float = 0.0
     dashes: list[str] = field(default_factory=list)
+    widths: list[str] = field(default_factory=list)
     ends: tuple[int, ...] = ()
 
 
@@ -113,9 +114,11 @@ def _drawn(line: _Line, frame: _Frame, seconds: float) -> str:
         words = ["".join(f"M{' '.join(each[a:b])}Z" for a, b in loops) for each in frames]
         return f'<path d="{words[0]}" {line.style}>{_animated("d", words, seconds)}</path>'
     words = [" ".join(each) for each in frames]
-    move = _animated("points", words, seconds) + _animated("stroke-dasharray", line.dashes, seconds, "discrete")
-    dashes = f' stroke-dasharray="{line.dashes[0]}"' if line.dashes else ""
-    return f'<polyline points="{words[0]}" {line.style}{dashes}>{move}</polyline>'
+    move, style = _animated("points", words, seconds), line.style
+    for name, values in (("stroke-dasharray", line.dashes), ("stroke-width", line.widths)):
+        style += f' {name}="{values[0]}"' if values else ""
+        move += _animated(name, values, seconds, "discrete")
+    return f'<polyline points="{words[0]}" {style}>{move}</polyline>'
 
 
 def _animated(name: str, values: list[str], seconds: float, mode: str = "linear") -> str:
@@ -189,6 +192,14 @@ def _rings(stage: Stage, frame: _Frame, states: Floats, seconds: float) -> Itera
             yield _placed(each, seconds, ring)
 
 
+def _centres(stage: Stage, frame: _Frame, states: Floats, seconds: float) -> Iterator[str]:
+    """Crosses at the centres of mass of bodies, which may have no other shape."""
+    for k, body in enumerate(stage.case.bodies):
+        middle = points_at(stage.case, body.name, np.zeros((1, stage.case.dimension)), states)[:, 0]
+        cross = f'<path d="M-4 0H4M0-4V4" stroke="{colour(k + 2)}" stroke-width="1.4"/>'
+        yield _placed(frame.pixels(stage.seen(middle)), seconds, cross)
+
+
 def _gravity(way: Floats, x: float) -> Iterator[str]:
     """The direction of gravity, around a place near the upper edge."""
     mark = Mark(glyphs()["gravity"], np.zeros(2), angle=float(np.arctan2(way[1], way[0])))
@@ -231,10 +242,11 @@ def _members(stage: Stage, thick: Thickness, states: Floats) -> Iterator[_Line]:
         places, slack = np.array([line for line, _ in drawn])[:, :, ends], np.array([hangs for _, hangs in drawn])
         for i, member in enumerate(some.tolist()):
             width = NARROWEST + (widest - NARROWEST) * float(share[member])
-            style = f'fill="none" stroke="{colour(order.index(family))}" stroke-width="{width:.2f}"'
+            style = f'fill="none" stroke="{colour(order.index(family))}"'
+            widths = [f"{THIN * width if hangs else width:.2f}" for hangs in slack[:, i]]
             beside = (widest + FREE) * sideways(places[:, i], np.full(len(states), side[i]))[:, None]
             dashes = [dashed if hangs else "none" for hangs in slack[:, i]] if slack[:, i].any() else []
-            yield _Line(style, places[:, i], beside, dashes)
+            yield _Line(style, places[:, i], beside, dashes, widths)
 
 
 def _touched(stage: Stage, states: Floats) -> Iterator[_Line]:

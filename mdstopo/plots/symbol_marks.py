@@ -18,8 +18,8 @@ SHORTEST = 0.45
 END_ON = 0.2
 #: points between a symbol and that of the ground below it
 BELOW = 0.8
-#: points: how large a symbol is in a legend, at most
-LARGEST = 13.0
+#: points: how large a symbol is in a legend, and how high, at most
+LARGEST, HIGHEST = 13.0, 10.0
 #: coordinates on the paper that run to the right and up
 AHEAD = np.ones(2)
 
@@ -120,7 +120,8 @@ def draw_marks(axis: Any, marks: list[Mark]) -> None:
         if mark.label is not None and mark.label.words not in named:
             named.add(mark.label.words)
             path = _all_of(mark.label)
-            size = min(LARGEST, 2.0 * float(np.abs(path.vertices).max()))
+            size = 2.0 * float(np.abs(path.vertices).max())
+            size *= min(1.0, LARGEST / size, HIGHEST / float(np.ptp(path.vertices[:, 1])))
             axis.plot([], [], marker=path, markersize=size, color=ink(), markeredgewidth=0.7,
                       markerfacecolor="none", linestyle="none", label=mark.label.words)  # fmt: skip
 

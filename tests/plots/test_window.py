@@ -244,35 +244,32 @@ def test_names_in_a_legend_are_whole() -> None:
     assert box.y0 >= axis.get_window_extent().y1
 
 
-@pytest.mark.parametrize("text", [EDGES, IN_SPACE])
-def test_a_body_called_as_a_symbol_is_told_from_it_and_stands_among_the_bodies(text: str) -> None:
+def test_long_names_in_a_legend_are_told_by_their_ends_and_many_leave_room_for_the_picture() -> None:
     from mdstopo.plots.style import styled
 
-    named = text.replace("  a:", "  load:").replace("{a:", "{load:").replace("body: a", "body: load")
-    named = named.replace("ground, a]", "ground, load]").replace("belts:", "_belts:").replace("chains:", "slack:")
+    long = "the_left_front_wheel_of_the_second_trailer_behind_the_tractor_WMW_W_"
+    bodies = "".join(f"  {long}{k}: {{mass: 1, inertia: 1, position: [{k}, 3]}}\n" for k in range(25))
     with styled() as module:
-        plain, other = (draw(module, source_of(each)).legends[0].get_texts() for each in (text, named))
-    calls = {"a": "body load", "belts": "members _belts", "chains": "members slack"}
-    assert [each.get_text() for each in other] == [calls.get(each.get_text(), each.get_text()) for each in plain]
-    assert other[-1].get_text() == "load"
+        figure = draw(module, source_of(EDGES.replace("joints:", f"{bodies}joints:")))
+        figure.canvas.draw()
+    (legend,), (axis,) = figure.legends, figure.axes
+    words = [each.get_text() for each in legend.get_texts()]
+    assert len(set(words)) == len(words) >= 27
+    assert sum(each.startswith("the_left_front") for each in words) == 25
+    box, title = legend.get_window_extent(), axis.get_window_extent().y1 + 0.1 * figure.dpi
+    assert box.x1 <= figure.bbox.x1
+    assert box.y0 >= title
 
 
-@pytest.mark.parametrize("text", [EDGES, IN_SPACE])
-def test_two_results_are_compared_at_one_scale_in_one_window(text: str) -> None:
-    from mdstopo.plots.designs_plot import draw_pair
+def test_symbols_in_a_legend_are_no_higher_than_its_lines() -> None:
     from mdstopo.plots.style import styled
 
-    other = text.replace("position: [4, 0.3]", "position: [6, -2]").replace(
-        "position: [0, 0, 0]", "position: [1, 0, 3]"
-    )
-    other = other.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
     with styled() as module:
-        figure = draw_pair(module, source_of(text), source_of(other), ("first", "second"))
-    assert len(figure.axes) == 4
-    for limits in ("get_xlim", "get_ylim"):
-        assert len({getattr(axis, limits)() for axis in figure.axes}) == 1
-    sizes = np.array([axis.get_position().size for axis in figure.axes])
-    assert sizes == pytest.approx(np.tile(sizes[0], (4, 1)), rel=1e-12)
+        figure = draw(module, source_of(EDGES.replace("force: [5, 1]", "force: [5, 1], moment: 4")))
+    (axis,) = figure.axes
+    (moment,) = (line for line in axis.lines if line.get_label() == "moment")
+    corners = moment.get_marker().vertices
+    assert 7.0 < moment.get_markersize() * np.ptp(corners[:, 1]) / (2.0 * np.abs(corners).max()) <= 10.0 + 1e-9
 
 
 def test_a_moving_svg_dashes_belts_while_they_are_slack_and_shows_what_is_touched() -> None:
