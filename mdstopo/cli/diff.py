@@ -72,9 +72,17 @@ def _say(output: Output, title: str, pairs: "list[Pair]") -> None:
     if not pairs:
         return
     output.say(title)
-    output.table([[pair.name, _short(pair.first), "->", _short(pair.second)] for pair in pairs[:MOST]])
+    output.table([_row(pair) for pair in pairs[:MOST]])
     if len(pairs) > MOST:
         output.say(f"  and {len(pairs) - MOST} more")
+
+
+def _row(pair: "Pair") -> list[str]:
+    """Two values that differ, in a table: numbers that do so in few digits with all of them."""
+    first, second = _short(pair.first), _short(pair.second)
+    if first == second and isinstance(pair.first, float) and isinstance(pair.second, float):
+        first, second = f"{pair.first!r}", f"{pair.second!r}"
+    return [pair.name, first, "->", second]
 
 
 def _short(value: Any) -> str:

@@ -13,7 +13,7 @@ from mdstopo.plots.slack import member_lines
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.stage import Stage
 from mdstopo.plots.style import WIDTH, ink
-from mdstopo.plots.thickness import FAINT, Thickness, thickness
+from mdstopo.plots.thickness import FAINT, Thickness, alike, thickness
 
 #: of the largest: a difference that is drawn
 LEAST = 0.05
@@ -39,19 +39,28 @@ def draw(module: Any, source: Source) -> Any:
 
 
 def draw_pair(module: Any, first: Source, second: Source, titles: tuple[str, str]) -> Any:
-    """Both designs, and below them the members of which there is more in the one or in the other."""
+    """Both designs, and below them the members of which there is more in the one or in the other.
+
+    Widths are relative to the largest of both designs, where they show the same of both.
+    """
     stages = [Stage(source, start_state(source.case)[None]) for source in (first, second)]
     if first.case.dimension == second.case.dimension:  # what is compared has one scale
         Stage.show_alike(stages)
     figure, axes, inches = _panels(module, stages, 2)
-    for axis, stage, title in zip(axes[0], stages, titles, strict=True):
-        stage.draw(axis, start_state(stage.case), thickness(stage.source), (None, None), inches)
+    thick = alike(first, second)
+    for axis, stage, own, title in zip(axes[0], stages, thick, titles, strict=True):
+        stage.draw(axis, start_state(stage.case), own, (None, None), inches)
         axis.set_title(title, loc="left")
-    for axis, stage, other, colour, title in (
-        (axes[1][0], stages[0], second, FIRST, "more in the first"),
-        (axes[1][1], stages[1], first, SECOND, "more in the second"),
+    pairs = np.array(same_members(first.case, second.case), dtype=np.intp).reshape(-1, 2)
+    one, other = (np.concatenate([*each.shares, np.zeros(0)]) for each in thick)
+    more, less = one.copy(), other.copy()
+    more[pairs[:, 0]] -= other[pairs[:, 1]]
+    less[pairs[:, 1]] -= one[pairs[:, 0]]
+    for axis, stage, own, rise, colour, title in (
+        (axes[1][0], stages[0], thick[0], more, FIRST, "more in the first"),
+        (axes[1][1], stages[1], thick[1], less, SECOND, "more in the second"),
     ):
-        _more(axis, stage, other, colour, inches)
+        _more(axis, stage, own, rise, (colour, inches))
         axis.set_title(title, loc="left")
     return figure
 
@@ -66,15 +75,19 @@ def _panels(module: Any, stages: list[Stage], rows: int) -> tuple[Any, list[list
     return figure, [[add_panel(figure, x, y, inches) for x, y in row] for row in places], inches
 
 
-def _more(axis: Any, stage: Stage, other: Source, colour: str, inches: Floats) -> None:
-    """What members of a result have more of than those of another; all others are thin."""
-    source, case, q = stage.source, stage.case, start_state(stage.case)
-    thick = thickness(source)
+def _more(axis: Any, stage: Stage, thick: Thickness, every: Floats, drawn_in: tuple[str, Floats]) -> None:
+    """What members of a result have more of than those of another; all others are thin.
+
+    axis: where they are drawn.
+    stage: what draws the result.
+    thick: how thick its members are.
+    every (K,): how much more there is of each, as a share.
+    drawn_in: the colour, and the size of the drawing in inches (2,).
+    """
+    case, q = stage.case, start_state(stage.case)
+    colour, inches = drawn_in
     blank = Thickness(tuple(np.zeros_like(share) for share in thick.shares), "")
     stage.draw(axis, q, blank, (None, None), inches, faint=0.5)
-    every, its = (np.concatenate([*each.shares, np.zeros(0)]) for each in (thick, thickness(other)))
-    pairs = np.array(same_members(case, other.case), dtype=np.intp).reshape(-1, 2)
-    every[pairs[:, 0]] -= its[pairs[:, 1]]
     more = np.split(every, np.cumsum([len(group) for group in case.members]))[:-1]
     drawn = [np.flatnonzero((rise > LEAST) | (share > FAINT)) for rise, share in zip(more, thick.shares, strict=True)]
     widest = widest_of(int((every > LEAST).sum()))

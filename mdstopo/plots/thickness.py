@@ -23,15 +23,34 @@ STATES, MANY = 400, 20_000
 
 @dataclass(frozen=True)
 class Thickness:
-    """How thick members are drawn. shares: of each group (M,), from 0 to 1, relative to the largest; what: what they
-    show, in words."""
+    """How thick members are drawn. shares: of each group (M,), from 0 to 1, relative to the largest.
+
+    shown: what they show, empty where nothing. largest: how much a share of 1 is, in a unit.
+    """
 
     shares: tuple[Floats, ...]
-    what: str
+    shown: str
+    largest: float = 0.0
+    unit: str = ""
+
+    @property
+    def what(self) -> str:
+        """What they show, in words; factors of laws have no number of one unit."""
+        return self.shown if self.shown in ("", "size") else f"{self.shown}, up to {self.largest:.3g}{self.unit}"
 
 
-def thickness(source: Source, alpha: Floats | None = None) -> Thickness:
-    """Of every group of the case. alpha: another design than the one of the file.
+def alike(first: Source, second: Source) -> tuple[Thickness, Thickness]:
+    """Of the members of two results, relative to the largest of both where they show the same."""
+    one, other = thickness(first), thickness(second)
+    if one.shown != other.shown:
+        return one, other
+    largest = max(one.largest, other.largest)
+    return thickness(first, largest=largest), thickness(second, largest=largest)
+
+
+def thickness(source: Source, alpha: Floats | None = None, largest: float = 0.0) -> Thickness:
+    """Of every group of the case. alpha: another design than the one of the file; largest: what shares are relative to,
+    0 for the largest there is.
 
     Where a group has a range, members are as thick as their share of it, relative to the thickest; those that are not
     varied have half of that. Where nothing is varied, their largest forces in the motions that the file has; without
@@ -42,31 +61,31 @@ def thickness(source: Source, alpha: Floats | None = None) -> Thickness:
     slices = case.group_slices
     varied = [group.design and group.upper > group.lower for group in case.members]
     if not any(varied):
-        return _of_final(source, design)
+        return _of_final(source, design, largest)
     shares = [sizes(group, design[slices[group.name]]) if group.design else None for group in case.members]
     ranged = [share for share, varies in zip(shares, varied, strict=True) if varies and share is not None]
-    most = max((float(share.max(initial=0.0)) for share in ranged), default=0.0) or 1.0
+    most = largest or max((float(share.max(initial=0.0)) for share in ranged), default=0.0) or 1.0
     found = []
     for group, share, varies in zip(case.members, shares, varied, strict=True):
         if varies and share is not None:
             found.append(share / most)
         else:
             found.append(np.full(len(group), PLAIN) if share is None else share)
-    return Thickness(tuple(found), f"alpha, up to {most:.3g}")
+    return Thickness(tuple(found), "alpha", most)
 
 
-def _of_final(source: Source, design: Floats) -> Thickness:
+def _of_final(source: Source, design: Floats, largest: float) -> Thickness:
     case = source.case
     peaks = stored_peaks(source, design) if case.n_members <= MANY else None
-    what = "largest force"
+    shown, unit = "largest force", " N"
     if peaks is None or not any(np.any(each) for each in peaks):
-        peaks, what = _factors(case, design), "size"
+        peaks, shown, unit = _factors(case, design), "size", ""
     if peaks is None:
         return Thickness(tuple(np.full(len(group), PLAIN) for group in case.members), "")
-    most = max((float(each.max(initial=0.0)) for each in peaks), default=0.0) or 1.0
+    most = largest or max((float(each.max(initial=0.0)) for each in peaks), default=0.0) or 1.0
     # a member that never pulls is there all the same
     shares = tuple(np.maximum(each / most, 2.0 * FAINT) for each in peaks)
-    return Thickness(shares, what if what == "size" else f"{what}, up to {most:.3g} N")
+    return Thickness(shares, shown, most, unit)
 
 
 def stored_peaks(source: Source, design: Floats) -> list[Floats] | None:

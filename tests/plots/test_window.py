@@ -339,3 +339,27 @@ def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(
             )
         )
     assert found == [1, 1]
+
+
+@pytest.mark.parametrize("largest", [1.0, 0.25])
+def test_two_designs_are_as_wide_as_they_are_beside_each_other(largest: float) -> None:
+    from mdstopo.plots.designs_plot import SECOND, draw_pair
+    from mdstopo.plots.style import styled
+    from mdstopo.plots.thickness import alike
+
+    text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
+    both = [source_of(text), source_of(text)]
+    both[0].alpha, both[1].alpha = largest * np.array([0.2, 0.4, 0.4]), largest * np.array([0.4, 0.8, 0.8])
+    one, other = alike(*both)
+    lower = both[0].case.members[0].lower
+    first, second = ((source.alpha - lower) / (0.8 * largest - lower) for source in both)
+    assert np.concatenate(one.shares) == pytest.approx(first)
+    assert np.concatenate(other.shares) == pytest.approx(second)
+    assert one.what == other.what == f"alpha, up to {(0.8 * largest - lower) / (1.0 - lower):.3g}"
+    with styled() as module:  # each member is twice as large in the second
+        figure = draw_pair(module, *both, ("first", "second"))
+    wanted = matplotlib.colors.to_rgba(SECOND)
+    drawn = [
+        len(each.get_segments()) for each in figure.axes[3].collections if tuple(each.get_colors()[:1].flat) == wanted
+    ]
+    assert sum(drawn) == 3
