@@ -26,19 +26,29 @@ LONGEST, BEGINNING = 50, 30
 WORDS = frozenset({"contact", "slack", *(glyph.words for glyph in glyphs().values())})
 
 
-def told(kind: str, name: str) -> str:
+def told(kind: str, name: str, case: Case | None = None) -> str:
     """What a legend calls a body or a group of members: its name, with the word `kind` before it where the name alone
-    would be left out by matplotlib (`_a`) or is that of something else in the legend (`load`). A name for which there
-    is no room lacks its middle, for names differ most often by their ends."""
-    whole = f"{kind} {name}" if name.startswith("_") or name in WORDS else name
+    would be left out by matplotlib (`_a`) or is that of something else in the legend of a case (`load`).
+
+    A name for which there is no room lacks its middle, for names differ most often by their ends.
+    """
+    is_other = case is not None and name in WORDS and name in _words(case)
+    whole = f"{kind} {name}" if name.startswith("_") or is_other else name
     return whole if len(whole) <= LONGEST else f"{whole[:BEGINNING]}\u2026{whole[BEGINNING + 1 - LONGEST :]}"
+
+
+def _words(case: Case) -> set[str]:
+    """What legends of a case name besides bodies and groups."""
+    found = {glyphs()[each.kind].words for load_case in case.load_cases for each in symbols(case, load_case.name)}
+    found |= {"contact"} if case.contacts else set()
+    return found | {"slack" for group in case.members if belt_lengths(case, group) is not None}
 
 
 def legend_names(case: Case, load_case: str | None = None) -> list[str]:
     """What a layout's legend may name, about in its order."""
     groups = dict.fromkeys(families(case))
-    names = [*["contact"] * bool(case.contacts), *(told("body", body.name) for body in case.bodies)]
-    names += [f"{told('members', group)}*" for group in groups] if len(groups) <= MOST_NAMED else []
+    names = [*["contact"] * bool(case.contacts), *(told("body", body.name, case) for body in case.bodies)]
+    names += [f"{told('members', group, case)}*" for group in groups] if len(groups) <= MOST_NAMED else []
     names += ["slack"] * any(belt_lengths(case, group) is not None for group in case.members)
     return [*names, *{glyphs()[each.kind].words: None for each in symbols(case, load_case)}]
 

@@ -55,7 +55,7 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
     chosen_from = {each for group, each in zip(case.members, named, strict=True) if group.design}
     for family in order if len(order) <= MOST_NAMED else ():
         star = "" if family in chosen_from or not chosen_from else "*"
-        axis.plot([], [], "-", color=colour(order.index(family)), label=f"{told('members', family)}{star}")
+        axis.plot([], [], "-", color=colour(order.index(family)), label=f"{told('members', family, case)}{star}")
     if any_slack:
         axis.plot([], [], color=ink("middle"), linewidth=0.8, linestyle=HANGING, label="slack")
 

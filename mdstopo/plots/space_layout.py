@@ -166,7 +166,7 @@ def draw_scene(axis: Any, source: Source, view: View, q: Floats, solids: dict[st
         if points:
             axis.plot(*view.seen(points_at(case, name, np.concatenate(points), state)[0]).T, ".", color=own, ms=2)
         if name != GROUND:
-            axis.plot(*view.seen(q[7 * k : 7 * k + 3]), "+", color=own, markersize=6, label=told("body", name))
+            axis.plot(*view.seen(q[7 * k : 7 * k + 3]), "+", color=own, markersize=6, label=told("body", name, case))
 
 
 def _outline(axis: Any, view: View, corners: Floats, shape: Solid, own: str) -> None:
