@@ -13,7 +13,12 @@ def __getattr__(name: str) -> type:
     if name.endswith(ENDING) and name not in KINDS:
         from mdstopo.general.dynamics import accelerations  # noqa: F401 (this and the following have structures)
         from mdstopo.general.events import landing  # noqa: F401
-        from mdstopo.general.integrators import gauss_window, generalized_alpha_step, generalized_alpha_switch  # noqa: F401
+        from mdstopo.general.integrators import (  # noqa: F401
+            adaptive_run,
+            gauss_window,
+            generalized_alpha_step,
+            generalized_alpha_switch,
+        )
         from mdstopo.general.model import general_model, priced_candidates  # noqa: F401
         from mdstopo.general.peaks import dense_output  # noqa: F401
         from mdstopo.general.pricing import priced_tile, sorted_members  # noqa: F401
