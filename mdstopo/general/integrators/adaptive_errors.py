@@ -8,6 +8,7 @@ from mdstopo.general.integrators.adaptive_run import reject
 from mdstopo.general.integrators.braking import friction_error
 from mdstopo.general.steps.first_step import motion_scale
 from mdstopo.general.steps.method_interface import step_error
+from mdstopo.general.steps.step_history import is_finite
 from mdstopo.integrators.steps import LIMITED, NON_FINITE, OK, TURN, decay_rate
 from mdstopo.mechanics.kinematics.kinematics_interface import largest_turn, motion_weights, relative_pose
 
@@ -31,7 +32,7 @@ def judge_step(tag, run):
     poses.at_end = least_singular_value(step.model, step.workspace)
     relative_pose(step.model, run.end_q, run.end_v, run.rel)
     error = _error(tag, run)
-    finite = _is_finite(run.end_q) and _is_finite(run.end_v)
+    finite = is_finite(run.end_q) and is_finite(run.end_v)
     if run.rules.fixed_step > 0.0:
         return finite, OK if finite else NON_FINITE
     if not finite or not error < ABSURD:
@@ -98,11 +99,3 @@ def _error(tag, run):
         if grip > error or not np.isfinite(grip):
             error = grip
     return error
-
-
-@kernel
-def _is_finite(x):
-    finite = True
-    for d in range(x.shape[0]):
-        finite = finite and np.isfinite(x[d])
-    return finite

@@ -7,12 +7,14 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import make_workspace
+from mdstopo.general.events.event_log import Crowd
 from mdstopo.general.events.events import has_switches, room_for_watched
 from mdstopo.general.events.landing import landing_of
 from mdstopo.general.events.locate import NEAREST
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.steps.method_interface import is_explicit, scheme
 from mdstopo.general.steps.run_start import ROUNDING, method_number, scene_size
+from mdstopo.general.steps.trial import Trial
 from mdstopo.integrators.springs_runge_kutta import MOST
 from mdstopo.integrators.steps import OF_REJECTED, REJECTED
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size
@@ -32,11 +34,9 @@ STRAIN = ("rel0", "weight", "motion", "noise", "scale", "shortest", "shaken")
 RATES = ("brake", "braking", "held", "decay", "limited", "ended", "moving")
 POSES = ("sigma", "at_end", "largest", "way", "reaches")
 ROOTS = ("ahead", "whose", "usual", "since", "nearest")
-TRY = ("h", "lands", "stages", "happens", "who")
 FIELDS = (
     "step", "rules", "strain", "rates", "poses", "roots", "trial", "history", "work", "where", "lam", "push", "end_q",
     "end_v", "a0", "rel", "before", "segment", "t", "wanted", "longest", "count", "stages", "events", "crowd",
-    "crowd_time",
 )  # fmt: skip
 
 
@@ -98,21 +98,11 @@ class Roots:
     def __init__(self, *_parts: object) -> None: ...
 
 
-class Try:
-    """The step that is being made.
-
-    h (s): its length. lands: whether it ends at the end of its segment. stages: how many are kept. happens, who:
-    whether it ends where a member switches, and who has the smallest margin.
-    """
-
-    def __init__(self, *_parts: object) -> None: ...
-
-
 class AdaptiveRun:
     """A run of adaptive steps, inside kernels.
 
     step: scene, members, state at the start of the step, its stages, workspace (`landing.Landing`).
-    rules, strain, rates, poses, roots, trial: a `Rules`, `Strain`, `Rates`, `Poses`, `Roots`, `Try`.
+    rules, strain, rates, poses, roots, trial: a `Rules`, `Strain`, `Rates`, `Poses`, `Roots`, `Trial`.
     history, work, where: as of `adaptive_steps.run_adaptive`.
     lam (n_row,), push (2, n_row): multipliers of the joints at the last stage, and of the projection.
     end_q (n_q,), end_v (n,): the end of the step. a0 (n,): accelerations at the start.
@@ -120,7 +110,7 @@ class AdaptiveRun:
     segment: number of the stretch of time between two breakpoints.
     t (s): time reached. wanted, longest (s): lengths of the next step, and of the longest so far.
     count, stages, events: how many there are.
-    crowd, crowd_time: how many switches in a row are very close to each other, and when they began (s).
+    crowd: an `event_log.Crowd`.
     """
 
     def __init__(self, *_parts: object) -> None: ...
@@ -131,7 +121,6 @@ bundle(Strain, STRAIN)
 bundle(Rates, RATES)
 bundle(Poses, POSES)
 bundle(Roots, ROOTS)
-bundle(Try, TRY)
 bundle(AdaptiveRun, FIELDS)
 
 
@@ -163,7 +152,7 @@ def make_run(tag, model, tables, tangent, settings, limits, history, member_stat
         _no_rates(model),
         Poses(0.0, 0.0, 0.0, np.inf, np.bool_(True)),
         Roots(np.inf, nobody, 0.0, -np.inf, settings[0] ** NEAREST),
-        Try(0.0, no, none, no, nobody),
+        Trial(0.0, no, none, no, nobody),
         history,
         work,
         where,
@@ -181,14 +170,20 @@ def make_run(tag, model, tables, tangent, settings, limits, history, member_stat
         none,
         none,
         none,
-        none,
-        t,
+        Crowd(none, t),
     )
 
 
 @kernel
 def _rules(tag, model, tangent, settings, limits, size):
-    """The `Rules` of a run. size: of the scene (m)."""
+    """The `Rules` of a run.
+
+    tag: the method of integration.
+    model: the compiled scene.
+    tangent: whether tangents are kept.
+    settings, limits: as of `adaptive_steps.run_adaptive`.
+    size: of the scene (m).
+    """
     s, order, _ = scheme(tag, method_number(model))
     explicit = is_explicit(tag)
     return Rules(

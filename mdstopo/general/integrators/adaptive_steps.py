@@ -13,10 +13,7 @@ switches (`adaptive_switch`), and kept; what one step hands to the next is an `A
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.dynamics.accelerations import solve_accelerations
 from mdstopo.general.dynamics.members import (
-    MODE,
-    SET,
     knotted_at,
     may_meet,
     meeting,
@@ -25,7 +22,7 @@ from mdstopo.general.dynamics.members import (
 )
 from mdstopo.general.dynamics.singular_poses import least_singular_value, way_to_pose
 from mdstopo.general.events.event_log import log_at_breakpoint
-from mdstopo.general.events.permanent_sets import begins_divided
+from mdstopo.general.events.start_balance import balance_at_start
 from mdstopo.general.integrators.adaptive_errors import judge_step
 from mdstopo.general.integrators.adaptive_length import plan_step
 from mdstopo.general.integrators.adaptive_run import make_run, reject
@@ -34,7 +31,7 @@ from mdstopo.general.integrators.braking import brake_rate
 from mdstopo.general.integrators.runge_kutta_step import advance
 from mdstopo.general.steps.first_step import first_step
 from mdstopo.general.steps.method_interface import UNSOLVED, scheme
-from mdstopo.general.steps.run_start import log_start, method_number, modes_at_start, motion_at_start
+from mdstopo.general.steps.run_start import log_start, method_number, motion_at_start
 from mdstopo.general.steps.step_history import EVENTS, FIRST, copy_vector, keep_state, keep_step
 from mdstopo.integrators.runge_kutta_tables import INSIDE
 from mdstopo.integrators.steps import (
@@ -97,25 +94,13 @@ def _begin(tag, run, tolerance):
     """
     step, rules, strain, history, where = run.step, run.rules, run.strain, run.history, run.where
     model, member_state, workspace = step.model, step.member_state, step.workspace
-    member_state[MODE] = 0.0
-    member_state[SET] = 0.0
     history.mass[0] = 0.0
-    for i in range(where.shape[0]):
-        where[i] = -1
     drive_state(model, np.int64(0), run.t, step.q0, step.v0)
-    singular = np.int64(-1)
-    if rules.switching:
-        singular = modes_at_start(
-            model, member_state, workspace, step.q0, step.v0, run.a0, run.lam, knotted_at(tolerance)
-        )
-        if singular < 0 and model.varied.shape[0] > 0:
-            where[2] = begins_divided(model, member_state, step.q0, step.v0, rules.graze)
-    if singular < 0:
-        singular = solve_accelerations(
-            model, member_state, np.int64(0), run.t, step.q0, step.v0, np.bool_(True), workspace, run.a0, run.lam
-        )
-        run.work[FORCES] += 1
-        run.work[OF_STARTS] += 1
+    singular = balance_at_start(
+        model, member_state, workspace, step.q0, step.v0, run.a0, run.lam, knotted_at(tolerance), rules.graze, where
+    )
+    run.work[FORCES] += 1
+    run.work[OF_STARTS] += 1
     if singular >= 0:
         where[0] = singular
         return SINGULAR

@@ -5,7 +5,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import solve_accelerations
 from mdstopo.general.dynamics.singular_poses import least_singular_value
-from mdstopo.general.events.event_log import CHATTER, log_switches
+from mdstopo.general.events.event_log import is_chattering, log_switches
 from mdstopo.general.events.events import is_doubtful, smallest_margin, watch_near
 from mdstopo.general.events.landing import CORRECTIONS, first_event
 from mdstopo.general.events.locate import AIM, NEAR, RESOLUTION, is_sharp, time_to_sharp
@@ -182,11 +182,7 @@ def go_on_behind(run):
     else:
         run.wanted = max(run.wanted, roots.usual)
     roots.usual = 0.0
-    span = model.times[model.times.shape[0] - 1] - model.times[0]
-    run.crowd = run.crowd + 1 if run.t - run.crowd_time < 1e-6 * span else 0
-    if run.crowd == 0:
-        run.crowd_time = run.t
-    if run.crowd > CHATTER:
+    if is_chattering(run.crowd, run.t, model.times):
         run.where[0] = run.trial.who
         return CHATTERING
     return OK

@@ -350,6 +350,15 @@ def events_included(member_state):
 
 
 @kernel
+def is_finite(x):
+    """Whether all numbers of a vector are finite."""
+    finite = True
+    for d in range(x.shape[0]):
+        finite = finite and np.isfinite(x[d])
+    return finite
+
+
+@kernel
 def copy_vector(source, target):
     """Copy a vector: target = source."""
     for i in range(source.shape[0]):
