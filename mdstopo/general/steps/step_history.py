@@ -7,6 +7,8 @@ step before step w).
 
 from typing import Annotated, Any
 
+import numpy as np
+
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.dynamics.members import MODE, SET
