@@ -14,7 +14,7 @@ from mdstopo.general.events.locate import NEAREST
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.steps.method_interface import is_explicit, scheme
 from mdstopo.general.steps.run_start import ROUNDING, method_number, scene_size
-from mdstopo.general.steps.trial import Trial
+from mdstopo.general.steps.step_trial import Trial
 from mdstopo.integrators.springs_runge_kutta import MOST
 from mdstopo.integrators.steps import OF_REJECTED, REJECTED
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size

@@ -15,7 +15,7 @@ from mdstopo.general.events.locate import CUTS
 from mdstopo.general.integrators.generalized_alpha_step import advance, make_step_room
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.steps.run_start import ROUNDING, scene_size
-from mdstopo.general.steps.trial import Trial
+from mdstopo.general.steps.step_trial import Trial
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size
 
 #: the parts of the structures below
