@@ -12,12 +12,17 @@ def __getattr__(name: str) -> type:
     """A type of a structure; all of them are made when the first one is asked for that is not made yet."""
     if name.endswith(ENDING) and name not in KINDS:
         from mdstopo.general.dynamics import accelerations  # noqa: F401 (this and the following have structures)
-        from mdstopo.general.events import landing  # noqa: F401
-        from mdstopo.general.integrators import gauss_window, generalized_alpha_step, generalized_alpha_switch  # noqa: F401
+        from mdstopo.general.events import event_log, landing  # noqa: F401
+        from mdstopo.general.integrators import (  # noqa: F401
+            adaptive_run,
+            gauss_window,
+            generalized_alpha_run,
+            generalized_alpha_step,
+        )
         from mdstopo.general.model import general_model, priced_candidates  # noqa: F401
         from mdstopo.general.peaks import dense_output  # noqa: F401
         from mdstopo.general.pricing import priced_tile, sorted_members  # noqa: F401
-        from mdstopo.general.steps import step_history  # noqa: F401
+        from mdstopo.general.steps import step_history, step_trial  # noqa: F401
 
         numba()
     try:

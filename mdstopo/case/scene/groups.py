@@ -1,4 +1,4 @@
-"""Member groups: grids joined, filters applied, laws read."""
+"""Member groups: the points that are joined, the laws of what joins them, what they cost."""
 
 from __future__ import annotations
 
@@ -9,40 +9,24 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray, Table
 from mdstopo.case.laws.law import numbers
-from mdstopo.case.memory import BYTES_PER_MEMBER, total_memory
 from mdstopo.case.model import GROUND, LAWS, Candidates, Law, MemberGroup, PointGrid
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.scene.candidates import ROUNDING, allowed_lengths, coincident, lengths_between
+from mdstopo.case.scene.pairing import Ends, can_be_priced, pairs_of, read_ends
 from mdstopo.case.text.reading import BAD, Fields, Reading
-from mdstopo.case.text.words import count_text, inside, number_text
+from mdstopo.case.text.words import inside, number_text
 from mdstopo.case.value import Value, frozen
 
-CHUNK = 1 << 18
-MOST_CANDIDATES = 10**10
-"""Pairs that filters may try, or that may be priced; more would take minutes."""
 PRICED = "priced"
 
 
 @frozen
-class _End(Value):
-    """The points at one end. text: what they are called; grid: their name, empty for a point in place."""
+class _Stated(Value):
+    """A group as the file states it: its name, its keys, its ends, its laws (None where they could not be read)."""
 
-    body: str
-    local: FloatArray
-    world: FloatArray
-    text: str
-    grid: str
-
-
-@frozen
-class _Pairs(Value):
-    """Candidates after the filters; zero: of how many the ends coincide, and the first of them."""
-
-    from_index: IndexArray
-    to_index: IndexArray
-    length: FloatArray
-    zero: int
-    first_zero: tuple[int, int]
+    name: str
+    fields: Fields
+    ends: Ends
+    laws: tuple[Law, ...] | None
 
 
 def build_groups(
@@ -50,14 +34,19 @@ def build_groups(
 ) -> dict[str, MemberGroup]:
     """The groups of members by name, without those that cannot be made; the design's numbers are filled in later."""
     groups: dict[str, MemberGroup] = {}
-    left = total_memory() // BYTES_PER_MEMBER
     for name, fields in (sections or {}).items():
         if fields is BAD:
             continue
         laws = build_laws(fields, reading)
-        group = _build_group(name, fields, laws, points, frames, reading, left)
+        ends = read_ends(fields, points, frames, reading)
+        if ends is None or not fields.good("candidates"):
+            continue
+        stated = _Stated(name, fields, ends, laws)
+        if fields["candidates"] == PRICED:
+            group = _priced(stated, frames, reading)
+        else:
+            group = _enumerated(stated, sum(map(len, groups.values())), frames, reading)
         if group is not None:
-            left -= len(group)
             groups[name] = group
     return groups
 
@@ -84,288 +73,115 @@ def build_laws(fields: Fields, reading: Reading) -> tuple[Law, ...] | None:
     return tuple(laws) if len(laws) == count else None
 
 
-def _build_group(
-    name: str,
-    fields: Fields,
-    laws: tuple[Law, ...] | None,
-    points: dict[str, PointGrid],
-    frames: Frames,
-    reading: Reading,
-    left: int,
-) -> MemberGroup | None:
-    """A group of members; None where it cannot be made, with the mistakes noted.
+def _enumerated(stated: _Stated, built: int, frames: Frames, reading: Reading) -> MemberGroup | None:
+    """A group whose members are all built; None where it cannot be made, with the mistakes noted.
 
-    name: the group's.
-    fields: the group in the file.
-    laws: of its members; None where they could not be read.
-    points: the point grids by name.
-    frames: where the bodies stand at the start.
-    reading: takes the mistakes.
-    left: for how many members there is memory.
+    built: how many members other groups have. frames: where the bodies stand at the start.
     """
-    path = fields.path
-    first = _end(fields, "from", points, frames, reading)
-    second = _end(fields, "to", points, frames, reading)
-    limits_good = fields.good("min_length", "max_length")
-    low, high = fields["min_length"], fields["max_length"]
-    if limits_good and high is not None and low > high:
-        message = f"found {number_text(high)}, allowed is at least min_length {number_text(low)}"
-        reading.mistake(inside(path, "max_length"), message)
-        limits_good = False
-    if first is None or second is None:
+    fields = stated.fields
+    pairs = pairs_of(stated.ends, built, reading)
+    if pairs is None or stated.laws is None or not fields.good("cost", "design"):
         return None
-    if first.body == second.body:
-        reading.mistake(path, f"both ends are on {first.body!r}; a member joins two bodies")
-        return None
-    if not (limits_good and fields.good("connect", "candidates")):
-        return None
-    if fields["candidates"] == PRICED:
-        return _priced_group(name, fields, laws, first, second, frames, reading)
-    pairs = _connect(first, second, fields["connect"], low, high, path, reading, left)
-    if pairs is None:
-        return None
-    if pairs.zero:
-        _note_zero(pairs.zero, pairs.first_zero, first, path, reading)
-        return None
-    if not len(pairs.length):
-        _note_empty(first, second, path, reading)
-        return None
-    if laws is None or not fields.good("cost", "design"):
-        return None
-    if not _in_range(laws, pairs.length, (first.body, second.body), frames, path, reading):
+    if not _in_range(stated.laws, pairs.length, stated.ends, frames, reading):
         return None
     cost = pairs.length if fields["cost"] == "length" else np.full(len(pairs.length), fields["cost"])
-    if not math.isfinite(float(cost.sum())):
-        reading.mistake(inside(path, "cost"), "the sum over the group is too large for a number")
+    if not _cost_in_range(float(cost.sum()), stated, reading):
         return None
-    return MemberGroup(
-        name,
-        first.body,
-        second.body,
-        first.local,
-        second.local,
-        first.world,
-        second.world,
-        pairs.from_index,
-        pairs.to_index,
-        pairs.length,
-        laws,
-        cost,
-        fields["design"],
-        from_points=first.grid,
-        to_points=second.grid,
-        cost_by_length=fields["cost"] == "length",
-    )
+    return _group(stated, stated.laws, (pairs.from_index, pairs.to_index), pairs.length, cost)
 
 
-def _note_zero(count: int, first_zero: tuple[int, int], first: _End, path: str, reading: Reading) -> None:
-    """The mistake that ends of members coincide. first: the points P."""
-    at = ", ".join(f"{value:g}" for value in first.world[first_zero[0]])
-    reading.mistake(
-        path,
-        f"{count_text(count)} of the members would have zero length, the first from P "
-        f"{first_zero[0]} to Q {first_zero[1]} at [{at}]; move the points or set min_length",
-    )
-
-
-def _note_empty(first: _End, second: _End, path: str, reading: Reading) -> None:
-    """The mistake that no member is within the stated lengths, with the distances that there are."""
-    least, most = math.inf, 0.0
-    for point in first.world:  # one by one: all distances at once may be too many for the memory
-        apart = lengths_between(point, second.world)
-        least, most = min(least, float(apart.min())), max(most, float(apart.max()))
-    reading.mistake(
-        path, f"min_length and max_length leave no member; the points are {least:.4g} to {most:.4g} m apart"
-    )
-
-
-def _priced_group(
-    name: str,
-    fields: Fields,
-    laws: tuple[Law, ...] | None,
-    first: _End,
-    second: _End,
-    frames: Frames,
-    reading: Reading,
-) -> MemberGroup | None:
+def _priced(stated: _Stated, frames: Frames, reading: Reading) -> MemberGroup | None:
     """A group whose members are priced, none of them built yet; None where it cannot be made, with the mistakes noted.
 
-    name: the group's.
-    fields: the group in the file.
-    laws: of its members; None where they could not be read.
-    first, second: the points at the two ends.
     frames: where the bodies stand at the start.
-    reading: takes the mistakes.
     """
-    path = fields.path
-    if fields["connect"] == "pairs":
-        reading.mistake(inside(path, "candidates"), "found priced, allowed with `connect: pairs` is enumerated")
-        return None
-    if fields["design"] is False:
-        reading.mistake(inside(path, "candidates"), "found priced, allowed with `design: false` is enumerated")
-        return None
-    count = len(first.world) * len(second.world)
-    if count > MOST_CANDIDATES:
-        most = count_text(MOST_CANDIDATES)
-        reading.mistake(path, f"{count_text(count)} candidates are more than can be priced; allowed are {most}")
-        return None
-    scale = float(max(np.abs(first.world).max(), np.abs(second.world).max()))
-    shortest, longest = allowed_lengths(fields["min_length"], fields["max_length"], scale)
-    if fields["min_length"] == 0.0:
-        zero, first_zero = coincident(first.world, second.world, ROUNDING * scale)
-        if zero:
-            _note_zero(zero, first_zero, first, path, reading)
+    fields, ends = stated.fields, stated.ends
+    for key, no in (("connect", "pairs"), ("design", False)):
+        if fields[key] == no:
+            message = f"found priced, allowed with `{key}: {str(no).lower()}` is enumerated"
+            reading.mistake(inside(ends.path, "candidates"), message)
             return None
-    if laws is None or not fields.good("cost", "design"):
+    if not can_be_priced(ends, reading) or stated.laws is None or not fields.good("cost", "design"):
         return None
-    size = float(np.linalg.norm(np.ptp(np.concatenate([first.world, second.world]), axis=0)))
-    if not _in_range(laws, np.array([size]), (first.body, second.body), frames, path, reading):
+    size = float(np.linalg.norm(np.ptp(np.concatenate([ends.first.world, ends.second.world]), axis=0)))
+    if not _in_range(stated.laws, np.array([size]), ends, frames, reading):
         return None
     cost = None if fields["cost"] == "length" else float(fields["cost"])
-    if not math.isfinite((size if cost is None else cost) * count):
-        reading.mistake(inside(path, "cost"), "the sum over the group is too large for a number")
+    if not _cost_in_range((size if cost is None else cost) * ends.candidates, stated, reading):
         return None
-    none = np.zeros(0, dtype=np.intp)
+    nobody = np.zeros(0, dtype=np.intp)
+    candidates = Candidates(ends.candidates, *ends.allowed, cost)
+    return _group(stated, stated.laws, (nobody, nobody), np.zeros(0), np.zeros(0), candidates)
+
+
+def _group(
+    stated: _Stated,
+    laws: tuple[Law, ...],
+    joined: tuple[IndexArray, IndexArray],
+    length: FloatArray,
+    cost: FloatArray,
+    candidates: Candidates | None = None,
+) -> MemberGroup:
+    """The group.
+
+    stated: what the file says of it.
+    laws: of its members.
+    joined: the points P and Q of its members.
+    length: of each of them at the start (m).
+    cost: of each of them.
+    candidates: of a priced group.
+    """
+    first, second = stated.ends.first, stated.ends.second
     return MemberGroup(
-        name,
-        first.body,
-        second.body,
-        first.local,
-        second.local,
-        first.world,
-        second.world,
-        none,
-        none,
-        np.zeros(0),
-        laws,
-        np.zeros(0),
-        True,
-        candidates=Candidates(count, shortest, longest, cost),
+        name=stated.name,
+        body_from=first.body,
+        body_to=second.body,
+        from_local=first.local,
+        to_local=second.local,
+        from_world=first.world,
+        to_world=second.world,
+        from_index=joined[0],
+        to_index=joined[1],
+        length=length,
+        laws=laws,
+        cost=cost,
+        design=stated.fields["design"],
+        candidates=candidates,
         from_points=first.grid,
         to_points=second.grid,
-        cost_by_length=cost is None,
+        cost_by_length=stated.fields["cost"] == "length",
     )
 
 
-def _end(fields: Fields, key: str, points: dict[str, PointGrid], frames: Frames, reading: Reading) -> _End | None:
-    end = fields[key]
-    if isinstance(end, str):
-        grid = points.get(end)
-        return None if grid is None else _End(grid.body, grid.local, grid.world, end, end)
-    if end is BAD or not end.good() or end["body"] not in frames.bodies:
-        return None
-    local = frames.local_point(end["body"], end["at"], end["frame"], inside(end.path, "at"), reading)
-    if local is BAD:
-        return None
-    _, world = frames.point(end["body"], end["at"], end["frame"])
-    return _End(end["body"], np.array([local]), np.array([world]), "the point", "")
+def _cost_in_range(total: float, stated: _Stated, reading: Reading) -> bool:
+    if math.isfinite(total):
+        return True
+    reading.mistake(inside(stated.ends.path, "cost"), "the sum over the group is too large for a number")
+    return False
 
 
-def _connect(
-    first: _End,
-    second: _End,
-    connect: str,
-    low: float,
-    high: float | None,
-    path: str,
-    reading: Reading,
-    left: int,
-) -> _Pairs | None:
-    """Join points to members and apply the filters; None where that gives too many, with the mistake noted.
-
-    first, second: the points at the two ends.
-    connect: `pairs` joins points of equal number, `all` each to each.
-    low, high: the lengths that the filters let pass (m); high may be None.
-    path: where the group stands in the file.
-    reading: takes the mistakes.
-    left: for how many members there is memory.
-    """
-    n_p, n_q = len(first.world), len(second.world)
-    if connect == "pairs" and n_p != n_q:
-        message = f"{first.text} has {n_p:,} points and {second.text} {n_q:,}; pairs need equal counts"
-        reading.mistake(inside(path, "connect"), message)
-        return None
-    candidates = n_p if connect == "pairs" else n_p * n_q
-    filtered = low > 0.0 or high is not None
-    most = MOST_CANDIDATES if filtered else left
-    if candidates > most:
-        what = "more than can be filtered" if filtered else "more than memory holds"
-        reading.mistake(path, f"{count_text(candidates)} members are {what}; allowed are {count_text(most)}")
-        return None
-    scale = max(np.abs(first.world).max(), np.abs(second.world).max())
-    if not filtered and connect == "all":
-        # The common case without temporaries of the candidates' size.
-        length = np.empty(candidates)
-        for start, stop, i, j in _chunks(n_p, n_q, connect):
-            length[start:stop] = lengths_between(first.world[i], second.world[j])
-        from_index = np.repeat(np.arange(n_p, dtype=np.intp), n_q)
-        to_index = np.tile(np.arange(n_q, dtype=np.intp), n_p)
-        return _checked(from_index, to_index, length, scale)
-    kept: list[tuple[IndexArray, IndexArray, FloatArray]] = []
-    count = 0
-    shortest, longest = allowed_lengths(low, high, scale)
-    for _, _, i, j in _chunks(n_p, n_q, connect):
-        lengths = lengths_between(first.world[i], second.world[j])
-        keep = (lengths >= shortest) & (lengths <= longest)
-        if low > 0.0:
-            keep &= lengths > 0.0
-        kept.append((i[keep], j[keep], lengths[keep]))
-        count += int(keep.sum())
-        if count > left:
-            message = f"more than {count_text(left)} members pass the filters: more than memory holds"
-            reading.mistake(path, message)
-            return None
-    i, j, length = (np.concatenate(parts) for parts in zip(*kept, strict=True))
-    return _checked(i, j, length, scale)
-
-
-def _chunks(n_p: int, n_q: int, connect: str) -> Any:
-    """(start, stop, i, j) over all candidates in order, CHUNK at a time."""
-    total = n_p if connect == "pairs" else n_p * n_q
-    for start in range(0, total, CHUNK):
-        stop = min(start + CHUNK, total)
-        member = np.arange(start, stop, dtype=np.intp)
-        yield (start, stop, member, member) if connect == "pairs" else (start, stop, *np.divmod(member, n_q))
-
-
-def _checked(i: IndexArray, j: IndexArray, length: FloatArray, scale: float) -> _Pairs:
-    zero = np.flatnonzero(length <= ROUNDING * scale)
-    first = (int(i[zero[0]]), int(j[zero[0]])) if len(zero) else (0, 0)
-    return _Pairs(i, j, length, len(zero), first)
-
-
-def _in_range(
-    laws: tuple[Law, ...],
-    length: FloatArray,
-    bodies: tuple[str, str],
-    frames: Frames,
-    path: str,
-    reading: Reading,
-) -> bool:
+def _in_range(laws: tuple[Law, ...], length: FloatArray, ends: Ends, frames: Frames, reading: Reading) -> bool:
     """Whether forces, energies and accelerations of the whole group stay finite; notes parameters that are too large.
 
     laws: of the members.
     length (n,): of the members at the start (m).
-    bodies: names of the two that they join.
+    ends: which bodies they join.
     frames: the bodies, with their masses (kg) and inertias (kg m²).
-    path: where the group stands in the file.
     reading: takes the mistakes.
     """
     longest = max(float(length.max()), 1.0)
-    masses = [frames.geometry.least(frames.bodies[name]) for name in bodies if name != GROUND]
+    bodies = [name for name in (ends.first.body, ends.second.body) if name != GROUND]
+    masses = [frames.geometry.least(frames.bodies[name]) for name in bodies]
     worst = len(length) * longest * longest / min([1.0, *masses])
     good = True
     for index, law in enumerate(laws):
-        if not numbers(type(law)):
-            continue
-        for key in type(law).__dataclass_fields__:
+        for key in type(law).__dataclass_fields__ if numbers(type(law)) else ():
             value = getattr(law, key)
             if isinstance(value, float) and not math.isfinite(value * worst):
                 # A list of laws has indices in its key paths, a single law has none.
-                where = inside(path, "law")
-                single = inside(where, key)
+                where = inside(ends.path, "law")
                 several = inside(f"{where}[{index}]", key)
-                at = several if reading.has_place(several) else single
+                at = several if reading.has_place(several) else inside(where, key)
                 message = f"found {number_text(value)}: the group's forces are too large for a number"
                 reading.mistake(at, message)
                 good = False

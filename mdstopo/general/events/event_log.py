@@ -6,6 +6,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import solve_accelerations
 from mdstopo.general.dynamics.members import MODE, SET
 from mdstopo.general.events.events import most_switches, smallest_margin, switch_any, watch_all
+from mdstopo.general.model.bundles import bundle
 from mdstopo.general.steps.step_history import (
     GIVEN,
     GRAZES,
@@ -20,8 +21,31 @@ from mdstopo.general.steps.step_history import (
 from mdstopo.integrators.steps import FORCES, OF_STARTS
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size, relative_pose
 
-#: events within a millionth of the simulated time after which the scene counts as chattering
-CHATTER = 400
+#: so many switches within a millionth of the simulated time are chattering
+CHATTER, TOGETHER = 400, 1e-6
+
+
+class Crowd:
+    """Switches in a row that are very close to each other, inside kernels. count: how many they are; since: when they
+    began (s)."""
+
+    def __init__(self, *_numbers: object) -> None: ...
+
+
+bundle(Crowd, ("count", "since"))
+
+
+@kernel
+def is_chattering(crowd, t, times):
+    """Whether so many members have switched within so short a time that this would go on forever.
+
+    crowd: the `Crowd`, to which a switch at t (s) is added. times: the breakpoints of the run (s).
+    """
+    span = times[times.shape[0] - 1] - times[0]
+    crowd.count = crowd.count + 1 if t - crowd.since < TOGETHER * span else 0
+    if crowd.count == 0:
+        crowd.since = t
+    return crowd.count > CHATTER
 
 
 @kernel

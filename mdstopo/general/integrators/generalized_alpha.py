@@ -14,27 +14,23 @@ that are exact.
 
 import numpy as np
 
-from mdstopo.compiler.jit import entry
-from mdstopo.general.dynamics.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.dynamics.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
-from mdstopo.general.events.event_log import CHATTER, log_at_breakpoint, log_switches
-from mdstopo.general.events.events import has_switches, room_for_watched, watch_all
-from mdstopo.general.events.permanent_sets import begins_divided
-from mdstopo.general.integrators.generalized_alpha_step import AUXILIARY, VELOCITY, make_step_room, rate_of
-from mdstopo.general.integrators.generalized_alpha_switch import (
-    FixedRun,
-    close_in,
-    first_piece,
-    make_step,
-    make_switch_room,
-)
+from mdstopo.compiler.jit import entry, kernel
+from mdstopo.general.dynamics.accelerations import solve_accelerations
+from mdstopo.general.dynamics.members import may_meet, meeting, scale_general, shortest_at_start
+from mdstopo.general.events.event_log import is_chattering, log_at_breakpoint, log_switches
+from mdstopo.general.events.events import watch_all
+from mdstopo.general.events.start_balance import balance_at_start
+from mdstopo.general.integrators.generalized_alpha_run import make_run, make_step
+from mdstopo.general.integrators.generalized_alpha_step import AUXILIARY, VELOCITY, rate_of
+from mdstopo.general.integrators.generalized_alpha_switch import end_at_switch
 from mdstopo.general.model.general_model import unpack_general
-from mdstopo.general.steps.run_start import ROUNDING, log_start, modes_at_start, motion_at_start, scene_size
+from mdstopo.general.steps.run_start import log_start, motion_at_start
 from mdstopo.general.steps.step_history import (
     EVENTS,
     FIRST,
     carve_history,
     copy_vector,
+    is_finite,
     keep_state,
     keep_step,
 )
@@ -49,12 +45,7 @@ from mdstopo.integrators.steps import (
     STEP_LIMIT,
     STEP_TOO_SMALL,
 )
-from mdstopo.mechanics.kinematics.kinematics_interface import (
-    deflection,
-    drive_state,
-    pose_size,
-    relative_pose,
-)
+from mdstopo.mechanics.kinematics.kinematics_interface import deflection, drive_state, relative_pose
 from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 
 TAG = (0, 0)
@@ -83,180 +74,180 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     reached (s).
     """
     model = unpack_general(ints, floats)
-    newton_tolerance = settings[1]
-    n_q = model.q0.shape[0]
-    n = model.v0.shape[0]
-    n_pair = model.pair.shape[0]
-    n_row = model.size[0]
     history = carve_history(model, limits, room, room_ints)
-    history.mass[0] = 0.0
     scale_general(model.block, model.power, alpha, member_state)
-    member_state[MODE] = 0.0
-    member_state[SET] = 0.0
-    times = model.times
-    workspace = make_workspace(model)
-    no = np.bool_(False)
-    size = scene_size(model)
-    rounding = ROUNDING * size
-    rel = np.empty((n_pair, pose_size(model)))
-    rel0 = np.empty((n_pair, pose_size(model)))
-    before = np.empty((n_pair, pose_size(model)))
-    q = np.zeros(n_q)
-    state = np.zeros((3, n))
-    end_q = np.zeros(n_q)
-    ends = np.zeros((3, n))
-    guess = np.zeros((3, n))
-    push = np.zeros((2, n_row))
-    lam = np.zeros(n_row)
-    a0 = np.zeros(n)
-    v = state[VELOCITY]
-    copy_vector(model.q0, q)
-    copy_vector(model.v0, v)
-    for i in range(where.shape[0]):
-        where[i] = -1
-    graze = settings[0] * size
-    t = times[0]
-    drive_state(model, np.int64(0), t, q, v)
-    switching = has_switches(model, no)
-    watched = room_for_watched(model)
-    watch_all(model, np.int64(0), watched)
-    if switching:
-        singular = modes_at_start(model, member_state, workspace, q, v, a0, lam, np.int64(0))
-        if singular >= 0:
-            where[0] = singular
-            return SINGULAR, 0, 0, t
-        if model.varied.shape[0] > 0:
-            where[2] = begins_divided(model, member_state, q, v, graze)
-    singular = solve_accelerations(model, member_state, np.int64(0), t, q, v, np.bool_(True), workspace, a0, lam)
+    run = make_run(model, tables[0], settings, history, member_state, where, work)
+    pace = run.pace
+    code = _begin(run)
+    for segment in range(model.times.shape[0] - 1):
+        if code == OK and segment > 0:
+            code = _pass_breakpoint(run, segment)
+        if code == OK:
+            _divide(run)
+        while code == OK and pace.t < model.times[segment + 1]:
+            code = _take_step(run, limits[0])
+    if code == OK:
+        history.index[pace.count + 1, FIRST] = pace.stages  # no step follows (`weights_of`)
+    return code, pace.count, pace.events, pace.t
+
+
+@kernel
+def _begin(run):
+    """Bring a run to its start: modes, accelerations, the length of steps.
+
+    Returns OK, or the code with which the run ends.
+    """
+    model, rules, pace, history, v = run.model, run.rules, run.pace, run.history, run.state[VELOCITY]
+    history.mass[0] = 0.0
+    drive_state(model, np.int64(0), pace.t, run.q, v)
+    watch_all(model, np.int64(0), run.watched)
+    singular = balance_at_start(
+        model, run.member_state, run.workspace, run.q, v, run.a0, run.lam, np.int64(0), rules.graze, run.where
+    )
     if singular >= 0:
-        where[0] = singular
-        return SINGULAR, 0, 0, t
-    relative_pose(model, q, v, rel0)
-    extent = np.zeros((2, n_pair))
-    motion = extent[0]
-    noise = extent[1]
-    stiffness = np.empty(n_pair)
-    motion_at_start(model, member_state, workspace, rel0, v, stiffness, motion, noise)
-    shortest = np.empty(n_pair)
-    shortest_at_start(model, rel0, shortest)
-    span = times[times.shape[0] - 1] - t
-    run = FixedRun(
-        model, tables[0], member_state, newton_tolerance, size, rounding, graze, watched, workspace, history, q, state,
-        guess, extent, rel0, make_step_room(model), rel, before, lam, where, work,
-    )  # fmt: skip
-    switch_room = make_switch_room(model)
-    step = settings[2]
-    if not step > 0.0:
-        rate = rate_of(model, workspace)
-        step = min(-step / rate, span / FEWEST) if rate > 0.0 else span / FEWEST
-    events = log_start(member_state, history) if switching else np.int64(0)
-    if events < 0:
-        return NEEDS_ROOM, 0, 0, t
-    keep_state(history, 0, t, q, v, push[0], push[1])
+        run.where[0] = singular
+        return SINGULAR
+    relative_pose(model, run.q, v, run.rel0)
+    stiffness = np.empty(run.shortest.shape[0])
+    motion_at_start(model, run.member_state, run.workspace, run.rel0, v, stiffness, run.extent[0], run.extent[1])
+    shortest_at_start(model, run.rel0, run.shortest)
+    if not rules.step > 0.0:
+        longest = (model.times[model.times.shape[0] - 1] - pace.t) / FEWEST
+        rate = rate_of(model, run.workspace)
+        rules.step = min(-rules.step / rate, longest) if rate > 0.0 else longest
+    if rules.switching:
+        events = log_start(run.member_state, history)
+        if events < 0:
+            return NEEDS_ROOM
+        pace.events = events
+    keep_state(history, 0, pace.t, run.q, v, run.push[0], run.push[1])
     history.index[0, FIRST] = 0
-    count = np.int64(0)
-    stages = np.int64(0)
-    crowd_time = t
-    crowd = 0
-    for segment in range(times.shape[0] - 1):
-        end = times[segment + 1]
-        if segment > 0:
-            drive_state(model, segment, t, q, v)
-            keep_state(history, count, t, q, v, history.push[count, 0], history.push[count, 1])
-            if switching:
-                events = log_at_breakpoint(
-                    model, member_state, segment, t, q, v, watched, workspace, a0, lam, history, count, events,
-                    rounding, work, where,
-                )  # fmt: skip
-                if events < 0:
-                    return NEEDS_ROOM, count, 0, t
-        begin = t
-        pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
-        done = 0.0
-        known = 0
-        while t < end:
-            h = (end - begin) / pieces
-            if not count + pieces - done <= limits[0]:
-                return STEP_LIMIT, count, events, t
-            if count + 3 > history.t.shape[0] or stages + 3 > history.when.shape[0]:
-                return NEEDS_ROOM, count, events, t
-            if not h > 1e-15 * max(abs(begin), abs(end)):
-                return STEP_TOO_SMALL, count, events, t
-            lands = done + 1.0 >= pieces
-            starting = np.bool_(known == 0)
-            code, used, singular = make_step(run, segment, t, h, starting, stages, state, end_q, ends, push)
-            if code != OK:
-                where[0] = singular
-                return code, count, events, t
-            relative_pose(model, end_q, ends[VELOCITY], rel)
-            happens = False
-            who = np.int64(-1)
-            if switching:
-                code, singular, margin, who, low, high, top = first_piece(
-                    run, switch_room, segment, t, h, starting, end_q, ends
-                )
-                happens = margin < -rounding
-                if happens and code == OK:
-                    code, singular, h, who = close_in(
-                        run, switch_room, segment, t, h, starting, low, high, top, margin, who
-                    )
-                if code != OK:
-                    where[0] = singular
-                    return code, count, events, t
-                if happens:
-                    lands = lands and t + h >= end
-                    code, used, singular = make_step(run, segment, t, h, starting, stages, state, end_q, ends, push)
-                relative_pose(model, end_q, ends[VELOCITY], rel)
-            finite = True
-            for d in range(n_q):
-                finite = finite and np.isfinite(end_q[d])
-            for d in range(n):
-                finite = finite and np.isfinite(ends[VELOCITY, d])
-            if not finite:
-                return NON_FINITE, count, events, t
-            for p in range(n_pair):
-                motion[p] = max(motion[p], deflection(model, rel, rel0, p))
-            if where[1] < 0 and may_meet(shortest, motion):
-                relative_pose(model, q, v, before)
-                where[1] = meeting(model, segment, t, member_state, before, rel)
-            done += 1.0
-            known += 1
-            t = end if lands else (t + h if happens else begin + h * done)
-            # x of the steps before; in the first ones it counts as having been constant
-            for d in range(n):
-                guess[2, d] = guess[1, d]
-                guess[1, d] = guess[0, d]
-                guess[0, d] = state[AUXILIARY, d]
-            if known <= 3:
-                for d in range(n):
-                    slope = ends[AUXILIARY, d] - state[AUXILIARY, d]
-                    guess[0, d] = ends[AUXILIARY, d] - slope
-                    guess[1, d] = ends[AUXILIARY, d] - 2.0 * slope
-                    guess[2, d] = ends[AUXILIARY, d] - 3.0 * slope
-            copy_vector(end_q, q)
-            copy_rows(ends, state)
-            stages += used
-            keep_step(history, count, segment, events, stages, t, q, v, push)
-            count += 1
-            work[ACCEPTED] += 1
-            if happens:
-                solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a0, lam)
-                events = log_switches(
-                    model, member_state, segment, t, q, v, watched, workspace, a0, lam, history, count, events, graze,
-                    rounding, work, where,
-                )  # fmt: skip
-                if events < 0:
-                    return NEEDS_ROOM, count, 0, t
-                crowd = crowd + 1 if t - crowd_time < 1e-6 * span else 0
-                if crowd == 0:
-                    crowd_time = t
-                if crowd > CHATTER:
-                    where[0] = who
-                    return CHATTERING, count, events, t
-                begin = t
-                done = 0.0
-                known = 0
-                pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
-            history.index[count, EVENTS] = events
-    history.index[count + 1, FIRST] = stages  # no step follows (`weights_of`)
-    return OK, count, events, t
+    return OK
+
+
+@kernel
+def _pass_breakpoint(run, segment):
+    """Go on behind a breakpoint of time; returns OK, or the code with which the run ends."""
+    model, pace, history, count, v = run.model, run.pace, run.history, run.pace.count, run.state[VELOCITY]
+    pace.segment = segment
+    drive_state(model, segment, pace.t, run.q, v)
+    keep_state(history, count, pace.t, run.q, v, history.push[count, 0], history.push[count, 1])
+    if not run.rules.switching:
+        return OK
+    events = log_at_breakpoint(
+        model, run.member_state, segment, pace.t, run.q, v, run.watched, run.workspace, run.a0, run.lam, history,
+        count, pace.events, run.rules.rounding, run.work, run.where,
+    )  # fmt: skip
+    pace.events = max(events, 0)
+    return OK if events >= 0 else NEEDS_ROOM
+
+
+@kernel
+def _divide(run):
+    """Divide what is left of the segment into equal steps, of which nothing before tells how they begin."""
+    pace = run.pace
+    pace.begin = pace.t
+    pace.pieces = max(np.ceil((run.model.times[pace.segment + 1] - pace.t) / run.rules.step - 1e-9), 1.0)
+    pace.done = 0.0
+    pace.known = 0
+
+
+@kernel
+def _take_step(run, most):
+    """Make a step and keep it. most: how many steps are allowed. Returns OK, or the code with which the run ends."""
+    model, pace, trial, history = run.model, run.pace, run.trial, run.history
+    end = model.times[pace.segment + 1]
+    trial.h = (end - pace.begin) / pace.pieces
+    if not pace.count + pace.pieces - pace.done <= most:
+        return STEP_LIMIT
+    if pace.count + 3 > history.t.shape[0] or pace.stages + 3 > history.when.shape[0]:
+        return NEEDS_ROOM
+    if not trial.h > 1e-15 * max(abs(pace.begin), abs(end)):
+        return STEP_TOO_SMALL
+    trial.lands = pace.done + 1.0 >= pace.pieces
+    trial.happens = np.bool_(False)
+    starting = np.bool_(pace.known == 0)
+    code, stages, singular = make_step(
+        run, pace.segment, pace.t, trial.h, starting, pace.stages, run.state, run.end_q, run.ends, run.push
+    )
+    trial.stages = stages
+    if code == OK:
+        relative_pose(model, run.end_q, run.ends[VELOCITY], run.rel)
+        if run.rules.switching:
+            code, singular = end_at_switch(run, starting)
+    if code != OK:
+        run.where[0] = singular
+        return code
+    if not (is_finite(run.end_q) and is_finite(run.ends[VELOCITY])):
+        return NON_FINITE
+    _keep(run)
+    code = _go_on_behind(run) if trial.happens else OK
+    if code == OK:
+        history.index[pace.count, EVENTS] = pace.events
+    return code
+
+
+@kernel
+def _keep(run):
+    """Keep the step that has been made: its end is the start of the next one."""
+    model, pace, trial = run.model, run.pace, run.trial
+    for p in range(run.rel.shape[0]):
+        run.extent[0, p] = max(run.extent[0, p], deflection(model, run.rel, run.rel0, p))
+    if run.where[1] < 0 and may_meet(run.shortest, run.extent[0]):
+        relative_pose(model, run.q, run.state[VELOCITY], run.before)
+        run.where[1] = meeting(model, pace.segment, pace.t, run.member_state, run.before, run.rel)
+    pace.done += 1.0
+    pace.known += 1
+    if trial.lands:
+        pace.t = model.times[pace.segment + 1]
+    else:
+        pace.t = pace.t + trial.h if trial.happens else pace.begin + trial.h * pace.done
+    _guess(run)
+    copy_vector(run.end_q, run.q)
+    copy_rows(run.ends, run.state)
+    pace.stages += trial.stages
+    keep_step(
+        run.history, pace.count, pace.segment, pace.events, pace.stages, pace.t, run.q, run.state[VELOCITY], run.push
+    )
+    pace.count += 1
+    run.work[ACCEPTED] += 1
+
+
+@kernel
+def _guess(run):
+    """x of the steps before, from which the next one's is guessed; in the first steps its slope counts as constant."""
+    guess, x, x_end = run.guess, run.state[AUXILIARY], run.ends[AUXILIARY]
+    for d in range(x.shape[0]):
+        guess[2, d] = guess[1, d]
+        guess[1, d] = guess[0, d]
+        guess[0, d] = x[d]
+    if run.pace.known <= 3:
+        for d in range(x.shape[0]):
+            slope = x_end[d] - x[d]
+            guess[0, d] = x_end[d] - slope
+            guess[1, d] = x_end[d] - 2.0 * slope
+            guess[2, d] = x_end[d] - 3.0 * slope
+
+
+@kernel
+def _go_on_behind(run):
+    """Log the switches at the end of a step that has been kept, and divide what is left of the segment anew.
+
+    Returns OK, or the code with which the run ends (`integrators.steps`).
+    """
+    model, pace, v = run.model, run.pace, run.state[VELOCITY]
+    solve_accelerations(
+        model, run.member_state, pace.segment, pace.t, run.q, v, np.bool_(False), run.workspace, run.a0, run.lam
+    )
+    events = log_switches(
+        model, run.member_state, pace.segment, pace.t, run.q, v, run.watched, run.workspace, run.a0, run.lam,
+        run.history, pace.count, pace.events, run.rules.graze, run.rules.rounding, run.work, run.where,
+    )  # fmt: skip
+    pace.events = max(events, 0)
+    if events < 0:
+        return NEEDS_ROOM
+    if is_chattering(run.crowd, pace.t, model.times):
+        run.where[0] = run.trial.who
+        return CHATTERING
+    _divide(run)
+    return OK

@@ -4,8 +4,6 @@ First it is found in which piece of the step a margin is used up, as `landing.fi
 root is bracketed and closed in on (`locate`).
 """
 
-from typing import Any
-
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
@@ -22,76 +20,12 @@ from mdstopo.general.events.locate import (
     note_trial,
     quintic_ends,
 )
-from mdstopo.general.integrators.generalized_alpha_step import VELOCITY, advance
-from mdstopo.general.model.bundles import bundle
+from mdstopo.general.integrators.generalized_alpha_run import make_step
+from mdstopo.general.integrators.generalized_alpha_step import VELOCITY
 from mdstopo.general.steps.step_history import copy_vector
 from mdstopo.integrators.steps import FORCES, OK
 from mdstopo.mechanics.kinematics.kinematics_interface import relative_pose
 from mdstopo.mechanics.kinematics.planar_poses import copy_rows
-
-#: the parts of a `FixedRun`
-PARTS = (
-    "model", "radius", "member_state", "newton_tolerance", "size", "rounding", "graze", "watched", "workspace",
-    "history", "q", "state", "guess", "extent", "rel0", "step_room", "rel", "before", "lam", "where", "work",
-)  # fmt: skip
-#: the arrays of a `SwitchRoom`
-ROOM = (
-    "cut", "beyond_q", "beyond", "left_q", "left_v", "kept", "trial_q", "trial", "trials", "curve_q", "curve", "push",
-)  # fmt: skip
-
-
-class FixedRun:
-    """What a run in fixed steps has in all of them, inside kernels.
-
-    model, radius, newton_tolerance, size, workspace, history, q, state, guess, extent, rel0, step_room, work: as
-    of `generalized_alpha_step.advance`. member_state (3, columns): scale, mode and permanent set. rounding, graze:
-    margins up to these count as zero, or touch zero only (m). watched: as of `events.smallest_margin`. rel, before
-    (n_pair, pose), lam (n_row,): scratch. where (3,): as of `generalized_alpha.simulate`.
-    """
-
-    def __init__(self, *_parts: Any) -> None: ...
-
-
-class SwitchRoom:
-    """What looking for a switch within a step takes, made by `make_switch_room`.
-
-    cut (CUTS + 1,): times after the start at which the step is cut, the end first (s). beyond_q (CUTS + 1, n_q), beyond
-    (CUTS + 1, 3, n): the states there. left_q (n_q,), left_v (n,): the last state known to be in front of the switch.
-    kept (3, n): the state that a trial begins with. trial_q (n_q,), trial (3, n): where it ends; push (2, n_row): what
-    put it onto the joints there. trials (2, 2), curve_q (2, n_q), curve (2, 2, n): as of `locate.foreseen_trial`.
-    """
-
-    def __init__(self, *_arrays: Any) -> None: ...
-
-
-bundle(FixedRun, PARTS)
-bundle(SwitchRoom, ROOM)
-
-
-@kernel
-def make_switch_room(model):
-    """A `SwitchRoom`."""
-    n_q = model.q0.shape[0]
-    n = model.v0.shape[0]
-    return SwitchRoom(
-        np.empty(CUTS + 1), np.zeros((CUTS + 1, n_q)), np.zeros((CUTS + 1, 3, n)), np.zeros(n_q), np.zeros(n),
-        np.zeros((3, n)), np.zeros(n_q), np.zeros((3, n)), np.zeros((2, 2)), np.empty((2, n_q)), np.empty((2, 2, n)),
-        np.zeros((2, model.size[0])),
-    )  # fmt: skip
-
-
-@kernel
-def make_step(run, segment, t, h, starting, o, state, end_q, ends, push):
-    """One step of a run: `generalized_alpha_step.advance`, which returns what this does.
-
-    run: a `FixedRun`.
-    segment, t, h, starting, o, state, end_q, ends, push: as of it.
-    """
-    return advance(
-        run.model, run.radius, run.member_state, segment, t, h, starting, run.q, state, run.guess,
-        run.newton_tolerance, run.size, o, run.workspace, run.history, end_q, ends, push, run.extent, run.rel0,
-        run.step_room, run.work,
-    )  # fmt: skip
 
 
 @kernel
@@ -110,7 +44,7 @@ def first_piece(run, room, segment, t, h, starting, end_q, ends):
     the cut at its end.
     """
     model, member_state, where, watched = run.model, run.member_state, run.where, run.watched
-    rel, before, rounding = run.rel, run.before, run.rounding
+    rel, before, rounding = run.rel, run.before, run.rules.rounding
     margin, who = smallest_margin(model, t + h, member_state, rel, watched)
     low = 0.0
     high = h
@@ -155,7 +89,7 @@ def first_piece(run, room, segment, t, h, starting, end_q, ends):
             margin = value
             who = near_who
             break
-        if value < run.graze and matters(model, t + middle, member_state, rel, near_who):
+        if value < run.rules.graze and matters(model, t + middle, member_state, rel, near_who):
             where[2] = near_who
     return code, singular, margin, who, low, high, top
 
@@ -175,7 +109,7 @@ def close_in(run, room, segment, t, h, starting, low, high, top, margin, who):
     Returns a code, with the unknown at which joints are singular; the length (s), and the member that switches.
     """
     model, member_state, watched = run.model, run.member_state, run.watched
-    rel, before, rounding = run.rel, run.before, run.rounding
+    rel, before, rounding = run.rel, run.before, run.rules.rounding
     singular = np.int64(-1)
     code = np.int64(OK)
     relative_pose(model, room.left_q, room.left_v, before)
@@ -209,3 +143,33 @@ def close_in(run, room, segment, t, h, starting, low, high, top, margin, who):
         note_trial(room.trials, middle, value)
         low, high, at_low, at_high, side = narrowed(low, high, at_low, at_high, middle, value, rounding, side)
     return code, singular, high, who
+
+
+@kernel
+def end_at_switch(run, starting):
+    """End the step that has been made where a member switches, if one does in it.
+
+    run: the run (`FixedRun`), whose `trial` and end are written. starting: as of `make_step`.
+
+    Returns a code, with the unknown at which joints are singular.
+    """
+    trial, segment, t = run.trial, run.pace.segment, run.pace.t
+    code, singular, margin, who, low, high, top = first_piece(
+        run, run.switch_room, segment, t, trial.h, starting, run.end_q, run.ends
+    )
+    trial.happens = margin < -run.rules.rounding
+    trial.who = who
+    if trial.happens and code == OK:
+        code, singular, length, who = close_in(
+            run, run.switch_room, segment, t, trial.h, starting, low, high, top, margin, who
+        )
+        trial.h = length
+        trial.who = who
+    if trial.happens and code == OK:
+        trial.lands = trial.lands and t + trial.h >= run.model.times[segment + 1]
+        code, stages, singular = make_step(
+            run, segment, t, trial.h, starting, run.pace.stages, run.state, run.end_q, run.ends, run.push
+        )
+        trial.stages = stages
+    relative_pose(run.model, run.end_q, run.ends[VELOCITY], run.rel)
+    return code, singular

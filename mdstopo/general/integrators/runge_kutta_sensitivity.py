@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.integrators.adaptive_steps import advance
 from mdstopo.general.integrators.runge_kutta import TAG
+from mdstopo.general.integrators.runge_kutta_step import advance
 from mdstopo.general.steps.method_interface import implement, scheme
-from mdstopo.general.steps.run_start import scene_size
+from mdstopo.general.steps.run_start import method_number, scene_size
 from mdstopo.general.steps.step_history import EVENTS, FIRST, PARENT, SEGMENT, keep_state, restore_modes
 from mdstopo.general.steps.step_inside import table_of_step
 from mdstopo.general.steps.step_linear import changes_forward, steps_back
@@ -25,7 +25,7 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
     """
     n = v.shape[0]
     n_q = q.shape[0]
-    method = 1 if model.size[2] != 0 else 0
+    method = method_number(model)
     s = scheme(tag, method)[0]
     h = c * (history.t[k + 1] - history.t[k])
     o = history.index[count, FIRST]

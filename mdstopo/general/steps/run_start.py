@@ -32,6 +32,12 @@ ROUNDING = 4e-15
 
 
 @kernel
+def method_number(model):
+    """Which of the two methods a scene takes: 0 where nothing depends on velocity and nothing switches, else 1."""
+    return 1 if model.size[2] != 0 else 0
+
+
+@kernel
 def scene_size(model):
     """A length of the scene (m), which rounding of positions is relative to."""
     size = 0.0

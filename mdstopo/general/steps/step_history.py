@@ -7,6 +7,8 @@ step before step w).
 
 from typing import Annotated, Any
 
+import numpy as np
+
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.dynamics.members import MODE, SET
@@ -347,6 +349,15 @@ def restore_modes(history, happened, member_state):
 def events_included(member_state):
     """How many events the modes in `member_state` include: kept in its last column, which belongs to no member."""
     return int(member_state[MODE, member_state.shape[1] - 1])
+
+
+@kernel
+def is_finite(x):
+    """Whether all numbers of a vector are finite."""
+    finite = True
+    for d in range(x.shape[0]):
+        finite = finite and np.isfinite(x[d])
+    return finite
 
 
 @kernel

@@ -16,6 +16,7 @@ from mdstopo.general.dynamics.accelerations import solve_accelerations
 from mdstopo.general.dynamics.projection import project
 from mdstopo.general.model.switches import APART, THOROUGH, UNFORMED
 from mdstopo.general.steps.method_interface import is_explicit, scheme
+from mdstopo.general.steps.run_start import method_number
 from mdstopo.general.steps.step_history import (
     FIRST,
     has_factors,
@@ -166,7 +167,7 @@ def table_of_step(tag, model, tables, history, w):
     tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
     history, w: the history of steps (`StepHistory`), and the step.
     """
-    method = 1 if model.size[2] != 0 else 0
+    method = method_number(model)
     s = history.index[w + 1, FIRST] - history.index[w, FIRST]
     table = tables[method]
     if is_explicit(tag) and s != scheme(tag, method)[0]:
