@@ -84,8 +84,8 @@ def how_far(before: "FloatArray", now: "FloatArray", seconds: float, end: float)
     done, recent = len(now) - 1, len(now) // 2
     step = float(now[-1] - now[-1 - recent]) / recent
     left = (end - float(now[-1])) / step
-    words = f"t = {number(float(now[-1]), 4)} of {number(end)} s after {done:,} steps; about {number(left, 2)} more steps "
-    words += f"of {number(step, 2)} s"
+    words = f"t = {number(float(now[-1]), 4)} of {number(end)} s after {done:,} steps; about "
+    words += f"{number(left, 2)} more steps of {number(step, 2)} s"
     rate = (len(now) - len(before)) / seconds
     if rate > 0.0:
         words += f", which take {duration(left / rate)}"
