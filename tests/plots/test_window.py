@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mdstopo.case.joints import JOINTS, FixedJoint
 from mdstopo.case.reader import read_case
 from mdstopo.plots.beside import side_places, sideways
 from mdstopo.plots.glyphs import glyphs
@@ -193,6 +194,16 @@ def test_the_symbol_of_ground_lies_below_that_of_a_joint_or_a_bushing_and_nowher
         assert tie.place.tolist() == place.tolist()
         assert ground.reach[1, 1] < tie.reach[0, 1]
     assert beside.below == 0.0
+
+
+def test_a_joint_without_a_symbol_of_its_own_is_drawn_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(JOINTS, "guide", FixedJoint)
+    glyphs.cache_clear()
+    try:
+        assert glyphs()["guide"].words == "guide joint"
+        assert glyphs()["fixed"].strokes[0].tolist() != glyphs()["guide"].strokes[0].tolist()
+    finally:
+        glyphs.cache_clear()
 
 
 def test_members_between_the_same_points_lie_beside_each_other_whichever_end_is_first() -> None:
