@@ -45,14 +45,21 @@ def thickness(source: Source, alpha: Floats | None = None) -> Thickness:
         return _of_final(source, design)
     shares = [sizes(group, design[slices[group.name]]) if group.design else None for group in case.members]
     ranged = [share for share, varies in zip(shares, varied, strict=True) if varies and share is not None]
-    most = max((float(share.max(initial=0.0)) for share in ranged), default=0.0) or 1.0
+    top = max((float(share.max(initial=0.0)) for share in ranged), default=0.0)
+    most = top or 1.0
+    # what the thickest has is told as alpha itself, as everywhere else, and not as the share of its range
+    largest = max(
+        float(design[slices[group.name]][share >= top].max(initial=0.0))
+        for group, share, varies in zip(case.members, shares, varied, strict=True)
+        if varies and share is not None
+    )
     found = []
     for group, share, varies in zip(case.members, shares, varied, strict=True):
         if varies and share is not None:
             found.append(share / most)
         else:
             found.append(np.full(len(group), PLAIN) if share is None else share)
-    return Thickness(tuple(found), f"alpha, up to {most:.3g}")
+    return Thickness(tuple(found), f"alpha, up to {largest:.3g}")
 
 
 def _of_final(source: Source, design: Floats) -> Thickness:

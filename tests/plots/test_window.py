@@ -17,6 +17,7 @@ from mdstopo.plots.scenery import start_state
 from mdstopo.plots.stage import Stage
 from mdstopo.plots.symbol_marks import ground_marks, marks_at
 from mdstopo.plots.symbols import symbols
+from mdstopo.plots.thickness import thickness
 from mdstopo.plots.views import views
 from mdstopo.plots.window import scale_of, window
 
@@ -204,6 +205,13 @@ def test_a_joint_without_a_symbol_of_its_own_is_drawn_and_named(monkeypatch: pyt
         assert glyphs()["fixed"].strokes[0].tolist() != glyphs()["guide"].strokes[0].tolist()
     finally:
         glyphs.cache_clear()
+
+
+@pytest.mark.parametrize(("alpha", "words"), [(0.5, "up to 0.5"), (0.2, "up to 0.2")])
+def test_a_picture_tells_alpha_itself_and_not_the_share_of_its_range(alpha: float, words: str) -> None:
+    source = source_of(EDGES + "design: {initial: 0.3, lower: 0.2, upper: 0.6}\n")
+    source.alpha = np.array([0.2, alpha, 0.2])
+    assert thickness(source).what == f"alpha, {words}"
 
 
 def test_members_between_the_same_points_lie_beside_each_other_whichever_end_is_first() -> None:
