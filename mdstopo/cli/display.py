@@ -3,10 +3,11 @@
 import sys
 import time
 from collections.abc import Callable
+from threading import Event, Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from mdstopo.cli.output import write
+from mdstopo.cli.output import duration, write
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _EVERY = 3.0  # seconds between plain lines
+_SILENT = 60.0  # seconds without news after which a plain line says that work goes on
 _REFRESH = 0.1  # seconds between changes of the picture
 
 
@@ -33,11 +35,32 @@ class Silent(Generic[T]):
 
 
 class Plain(Silent[T]):
-    """A display for logs: a line every few seconds. Work that is over before then is not mentioned."""
+    """A display for logs: a line every few seconds, and one a minute where there are no news. Work that is over before
+    then is not mentioned."""
 
-    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        self._clock = clock
-        self._said_at = clock()
+    def __init__(self, clock: Callable[[], float] = time.perf_counter, silent: float = _SILENT) -> None:
+        self._clock, self._silent = clock, silent
+        self._begun_at = self._said_at = clock()
+        self._over = Event()
+
+    def __enter__(self) -> "Plain[T]":
+        Thread(target=self._say_in_silence, daemon=True).start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+
+    def _say_in_silence(self) -> None:
+        """Say that work goes on, each time that nothing has been said for long."""
+        wait = self._silent
+        while not self._over.wait(wait):
+            now = self._clock()
+            wait = self._said_at + self._silent - now
+            if wait <= 0.0:
+                self._said_at, wait = now, self._silent
+                write(sys.stderr, f"at work for {duration(now - self._begun_at)}; the next result is still to come")
 
     def __call__(self, progress: T) -> None:
         """Say it if it is time."""

@@ -40,8 +40,9 @@ def front_display(quiet: bool) -> "displays.Silent[Snapshot]":
 def line(snapshot: "Snapshot") -> str:
     """How far a front has come, in one line."""
     total = len(snapshot.directions)
+    at_work = f", {len(snapshot.running)} are worked on" if snapshot.running else ""
     return (
-        f"{len(snapshot.best)} of {total} points have a design, {len(snapshot.running)} are worked on; "
+        f"{len(snapshot.best)} of {total} points have a design{at_work}; "
         f"{snapshot.done} solves, {snapshot.evaluations} evaluations, {_left(snapshot.left, snapshot.more)}"
     )
 

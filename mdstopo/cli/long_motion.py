@@ -45,7 +45,10 @@ def told_while(
             before, at = steps_done(driver), time.monotonic()
             if len(before) < 2 or over.wait(SHORT):
                 continue
-            sentence = how_far(before, steps_done(driver), time.monotonic() - at, end)
+            now = steps_done(driver)
+            if now[-1] >= end:
+                continue  # what still takes time is not the motion
+            sentence = how_far(before, now, time.monotonic() - at, end)
             if not cause:
                 cause = fastest(case, alpha, name)
                 sentence += f"; {cause}" if cause else ""
@@ -81,11 +84,11 @@ def how_far(before: "FloatArray", now: "FloatArray", seconds: float, end: float)
     done, recent = len(now) - 1, len(now) // 2
     step = float(now[-1] - now[-1 - recent]) / recent
     left = (end - float(now[-1])) / step
-    words = f"t = {number(float(now[-1]), 4)} of {number(end)} s after {done:,} steps; about {number(left, 2)} more of "
-    words += f"{number(step, 2)} s"
+    words = f"t = {number(float(now[-1]), 4)} of {number(end)} s after {done:,} steps; about "
+    words += f"{number(left, 2)} more steps of {number(step, 2)} s"
     rate = (len(now) - len(before)) / seconds
     if rate > 0.0:
-        words += f", {duration(left / rate)}"
+        words += f", which take {duration(left / rate)}"
     return f"{words}: more than the {MAX_STEPS:,} that a motion may take" if done + left > MAX_STEPS else words
 
 

@@ -58,5 +58,7 @@ def command(name: str | None, template: str, listing: bool, out: Path | None, qu
         raise StoreError(f"{place} exists already; it is left as it is") from error
     except OSError as error:
         raise StoreError(f"{place}: cannot be written: {error.strerror}") from error
+    if name in known and name != template:
+        output.notice(f"this is the template {template}; the one called {name} is written by --template {name}")
     output.say(f"{place}\n  mdstopo check {place}\n  mdstopo run {place}\n  mdstopo plot results/{place.stem}.h5")
     return 0

@@ -226,6 +226,7 @@ def quality_rows(names: list[str], numbers: "Mapping[str, Any]", part: "Mapping[
 
 
 def _say(output: Output, outcome: "FrontOutcome") -> None:
+    from mdstopo.status import RunStatus
     from mdstopo.store.whole_front import joined
 
     case = outcome.case
@@ -233,6 +234,9 @@ def _say(output: Output, outcome: "FrontOutcome") -> None:
     names = [objective.name for objective in case.objectives]
     part = joined(outcome.part, names)
     output.table(front_rows(names, part))
+    for j, word in enumerate(part["status"]):
+        if word == RunStatus.FAILED:
+            output.say(f"point {j}: {part['reason'][j]}")
     good = outcome.quality
     numbers = {} if good is None else good.numbers()
     scale = {} if good is None else {"ideal": good.ideal, "nadir": good.nadir}

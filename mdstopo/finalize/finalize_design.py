@@ -39,6 +39,8 @@ TIGHTEST = 1e-13
 """Tolerances below it are lost in rounding."""
 WORSE = 0.05
 """Share by which an objective may be worse than the full design's without a word."""
+FAR = 10.0
+"""The share from which on it is no longer told: the full design has brought the objective near zero."""
 SHORTER = 10.0
 """The same for fixed steps: errors of second order fall a hundredfold."""
 
@@ -239,8 +241,9 @@ def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...
         before, now = (columns[k].evaluation.objectives[objective.name] for k in (0, -1))
         loss = (before - now if objective.sense == "maximize" else now - before) / abs(before) if before else 0.0
         if loss > WORSE:
+            by = f"{loss:.1%}" if loss < FAR else "far"
             told.append(
-                f"{objective.name} of the final design is {loss:.1%} worse than the full design promised: "
+                f"{objective.name} of the final design is {by} worse than the full design promised: "
                 f"{now:.6g} in place of {before:.6g}; keep more members"
             )
     return tuple(told)

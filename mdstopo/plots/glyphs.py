@@ -5,6 +5,8 @@ from functools import cache
 
 import numpy as np
 
+from mdstopo.case.joints import JOINTS
+from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
 from mdstopo.plots.scenery import Floats
 
 
@@ -42,6 +44,7 @@ def _turn(radius: float) -> tuple[Floats, Floats]:
 
 
 _HATCH = tuple(_line((x, 0.0), (x - 2.5, -3.0)) for x in (-3.0, 0.0, 3.0, 6.0))
+_DIAMOND = _line((-4, 0), (0, -4), (4, 0), (0, 4), (-4, 0))
 _CROSS = (_line((-3.6, 0), (3.6, 0)), _line((0, -3.6), (0, 3.6)))
 _BLOCK_ARROW = _line((0, 1.5), (15, 1.5), (15, 4.5), (23, 0), (15, -4.5), (15, -1.5), (0, -1.5), (0, 1.5))
 _ZIGZAG = _line((-7, 0), (-5, 0), (-4, 3), (-2, -3), (0, 3), (2, -3), (4, 3), (5, 0), (7, 0))
@@ -56,10 +59,10 @@ _DIAGONALS = (_line((-3.4, -3.4), (3.4, 3.4)), _line((-3.4, 3.4), (3.4, -3.4)))
 
 @cache
 def glyphs() -> dict[str, Glyph]:
-    """By kind: those of joints have the joint's word."""
+    """By kind: those of joints have the joint's word. A joint that has no symbol of its own is a diamond."""
     arc, head = _turn(8.0)
     driven, driven_head = _turn(11.0)
-    return {
+    known = {
         "revolute": Glyph((_circle(3.2),), "paper", "revolute joint"),
         "spherical": Glyph((_circle(3.6), _circle(1.4)), "paper", "spherical joint"),
         "universal": Glyph((_circle(3.6), *_CROSS), "paper", "universal joint"),
@@ -78,3 +81,5 @@ def glyphs() -> dict[str, Glyph]:
         "gravity": Glyph((_line((0, 0), (14, 0)), _line((18, 0), (13, 2.2), (13, -2.2), (18, 0))), "ink", "gravity"),
         "ground": Glyph((_line((-5, 0), (6, 0)), *_HATCH), "", "ground"),
     }  # fmt: skip
+    others = {word: Glyph((_DIAMOND,), "paper", f"{word} joint") for word in (*JOINTS, *SPATIAL_JOINTS)}
+    return others | known

@@ -1,7 +1,7 @@
 """How thick each member is drawn: by its design value, or in a final design by its largest force or its law."""
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,18 +25,20 @@ STATES, MANY = 400, 20_000
 class Thickness:
     """How thick members are drawn. shares: of each group (M,), from 0 to 1, relative to the largest.
 
-    shown: what they show, empty where nothing. largest: how much a share of 1 is, in a unit.
+    shown: what they show, empty where nothing. largest: how much a share of 1 is. told: that number as it is told, in a
+    unit: alpha itself, where shares are of its range.
     """
 
     shares: tuple[Floats, ...]
     shown: str
     largest: float = 0.0
+    told: float = 0.0
     unit: str = ""
 
     @property
     def what(self) -> str:
         """What they show, in words; factors of laws have no number of one unit."""
-        return self.shown if self.shown in ("", "size") else f"{self.shown}, up to {self.largest:.3g}{self.unit}"
+        return self.shown if self.shown in ("", "size") else f"{self.shown}, up to {self.told:.3g}{self.unit}"
 
 
 def alike(first: Source, second: Source) -> tuple[Thickness, Thickness]:
@@ -44,8 +46,9 @@ def alike(first: Source, second: Source) -> tuple[Thickness, Thickness]:
     one, other = thickness(first), thickness(second)
     if one.shown != other.shown:
         return one, other
-    largest = max(one.largest, other.largest)
-    return thickness(first, largest=largest), thickness(second, largest=largest)
+    largest, told = max(one.largest, other.largest), max(one.told, other.told)
+    one, other = thickness(first, largest=largest), thickness(second, largest=largest)
+    return replace(one, told=told), replace(other, told=told)
 
 
 def thickness(source: Source, alpha: Floats | None = None, largest: float = 0.0) -> Thickness:
@@ -64,14 +67,20 @@ def thickness(source: Source, alpha: Floats | None = None, largest: float = 0.0)
         return _of_final(source, design, largest)
     shares = [sizes(group, design[slices[group.name]]) if group.design else None for group in case.members]
     ranged = [share for share, varies in zip(shares, varied, strict=True) if varies and share is not None]
-    most = largest or max((float(share.max(initial=0.0)) for share in ranged), default=0.0) or 1.0
+    top = max((float(share.max(initial=0.0)) for share in ranged), default=0.0)
+    most = largest or top or 1.0
+    told = max(
+        float(design[slices[group.name]][share >= top].max(initial=0.0))
+        for group, share, varies in zip(case.members, shares, varied, strict=True)
+        if varies and share is not None
+    )
     found = []
     for group, share, varies in zip(case.members, shares, varied, strict=True):
         if varies and share is not None:
             found.append(share / most)
         else:
             found.append(np.full(len(group), PLAIN) if share is None else share)
-    return Thickness(tuple(found), "alpha", most)
+    return Thickness(tuple(found), "alpha", most, told)
 
 
 def _of_final(source: Source, design: Floats, largest: float) -> Thickness:
@@ -85,7 +94,7 @@ def _of_final(source: Source, design: Floats, largest: float) -> Thickness:
     most = largest or max((float(each.max(initial=0.0)) for each in peaks), default=0.0) or 1.0
     # a member that never pulls is there all the same
     shares = tuple(np.maximum(each / most, 2.0 * FAINT) for each in peaks)
-    return Thickness(shares, shown, most, unit)
+    return Thickness(shares, shown, most, most, unit)
 
 
 def stored_peaks(source: Source, design: Floats) -> list[Floats] | None:

@@ -461,10 +461,12 @@ class _Run:
         space = self.case.space
         design = space.expand(state.best_alpha)
         evaluation = engine.evaluate(design, gradient=True)
+        message = getattr(evaluation, "message", "")
         if not evaluation.status.ok:
             lacks = "the sensitivities of the final design: " if evaluation.gradients else "no sensitivities: "
-            self.warnings += (f"{lacks}{evaluation.status.value}",)
-        if message := getattr(evaluation, "message", ""):
+            whose = f": {message}" if message else ""
+            self.warnings += (f"{lacks}{evaluation.status.value}{whose}",)
+        elif message:
             self.warnings += (message,)
         self.peaks = {
             name: tuple((peak.time, peak.value) for peak in found) for name, found in evaluation.peaks.items()

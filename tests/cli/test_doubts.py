@@ -154,6 +154,11 @@ def test_a_final_design_much_worse_than_the_full_one_is_told(sense: str, now: fl
         assert "20.0% worse than the full design promised" in found[0]
 
 
+def test_how_much_worse_than_nearly_nothing_is_not_told_in_percent() -> None:
+    found = worse_than_promised(read_case(CRATE.format(**PLAIN)), [evaluated(1e-14), evaluated(0.3)])
+    assert "G of the final design is far worse than the full design promised: 0.3 in place of 1e-14" in found[0]
+
+
 def test_a_bad_case_is_json_with_every_mistake(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "bad.yaml"
     path.write_text(CRATE.format(**{**PLAIN, "inertia": "-6", "gravity": "down"}))

@@ -35,8 +35,27 @@ def test_steps_that_are_done_are_those_before_the_unused_room() -> None:
 def test_how_far_is_told_by_the_steps_of_late() -> None:
     before, now = np.linspace(0.0, 0.05, 51), np.linspace(0.0, 0.1, 101)
     words = how_far(before, now, 2.0, 1.1)
-    assert words == "t = 0.1 of 1.1 s after 100 steps; about 1e+03 more of 0.001 s, 40 s"
+    assert words == "t = 0.1 of 1.1 s after 100 steps; about 1e+03 more steps of 0.001 s, which take 40 s"
     assert how_far(now, now, 2.0, 1100.1).endswith("0.001 s: more than the 1,000,000 that a motion may take")
+
+
+def test_nothing_is_told_of_a_motion_that_is_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(long_motion, "SHORT", 0.001)
+    asked = list[str]()
+
+    def all_steps(driver: Any) -> Any:
+        asked.append("")
+        return np.linspace(0.0, 1.0, 11)
+
+    monkeypatch.setattr(long_motion, "steps_done", all_steps)
+    case, said = read_case(CASE), list[str]()
+    engine: Any = SimpleNamespace(driver=lambda name: None)
+    with told_while(said.append, case, engine, case.start, "default", first=0.0, every=0.001):
+        end = time.monotonic() + 20.0
+        while len(asked) < 6 and time.monotonic() < end:
+            time.sleep(0.002)
+    assert len(asked) >= 6
+    assert said == []
 
 
 def test_what_makes_steps_short_is_named() -> None:

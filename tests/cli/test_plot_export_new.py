@@ -273,6 +273,15 @@ def test_every_template_is_a_case_without_a_doubt(tmp_path, monkeypatch, capsys)
     assert run_group(["new"]) == 2
 
 
+def test_who_names_a_template_without_the_option_is_told_which_one_it_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run_group(["new", "space"]) == 0
+    assert "template crate; the one called space is written by --template space" in capsys.readouterr().err
+    assert run_group(["new", "crate"]) == 0
+    assert run_group(["new", "seat", "--template", "seat"]) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_the_starter_case_is_right_and_is_never_written_over_another(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run_group(["new", "my-deck"]) == 0

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mdstopo.case.joints import JOINTS, FixedJoint
 from mdstopo.case.reader import read_case
 from mdstopo.plots.beside import side_places, sideways
 from mdstopo.plots.glyphs import glyphs
@@ -16,6 +17,7 @@ from mdstopo.plots.scenery import start_state
 from mdstopo.plots.stage import Stage
 from mdstopo.plots.symbol_marks import ground_marks, marks_at
 from mdstopo.plots.symbols import symbols
+from mdstopo.plots.thickness import thickness
 from mdstopo.plots.views import views
 from mdstopo.plots.window import scale_of, window
 
@@ -195,6 +197,23 @@ def test_the_symbol_of_ground_lies_below_that_of_a_joint_or_a_bushing_and_nowher
     assert beside.below == 0.0
 
 
+def test_a_joint_without_a_symbol_of_its_own_is_drawn_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(JOINTS, "guide", FixedJoint)
+    glyphs.cache_clear()
+    try:
+        assert glyphs()["guide"].words == "guide joint"
+        assert glyphs()["fixed"].strokes[0].tolist() != glyphs()["guide"].strokes[0].tolist()
+    finally:
+        glyphs.cache_clear()
+
+
+@pytest.mark.parametrize(("alpha", "words"), [(0.5, "up to 0.5"), (0.2, "up to 0.2")])
+def test_a_picture_tells_alpha_itself_and_not_the_share_of_its_range(alpha: float, words: str) -> None:
+    source = source_of(EDGES + "design: {initial: 0.3, lower: 0.2, upper: 0.6}\n")
+    source.alpha = np.array([0.2, alpha, 0.2])
+    assert thickness(source).what == f"alpha, {words}"
+
+
 def test_members_between_the_same_points_lie_beside_each_other_whichever_end_is_first() -> None:
     case = read_case(EDGES)
     found = side_places(case, [np.arange(len(group)) for group in case.members])
@@ -355,7 +374,7 @@ def test_two_designs_are_as_wide_as_they_are_beside_each_other(largest: float) -
     first, second = ((source.alpha - lower) / (0.8 * largest - lower) for source in both)
     assert np.concatenate(one.shares) == pytest.approx(first)
     assert np.concatenate(other.shares) == pytest.approx(second)
-    assert one.what == other.what == f"alpha, up to {(0.8 * largest - lower) / (1.0 - lower):.3g}"
+    assert one.what == other.what == f"alpha, up to {0.8 * largest:.3g}"
     with styled() as module:  # each member is twice as large in the second
         figure = draw_pair(module, *both, ("first", "second"))
     wanted = matplotlib.colors.to_rgba(SECOND)

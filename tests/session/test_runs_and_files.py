@@ -18,7 +18,7 @@ from mdstopo.case.model import Case, VolumeRow
 from mdstopo.case.text.errors import CaseError
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.run_session import run_session
-from mdstopo.status import RunStatus
+from mdstopo.status import RunStatus, Status
 from mdstopo.store import atomic
 from mdstopo.store.result_reader import read_result
 from mdstopo.store.store_errors import DamagedError, DifferentCaseError, InUseError, UnfinishedError, WriteError
@@ -347,3 +347,18 @@ def test_a_signal_ends_the_run_after_the_iteration(number: signal.Signals, tmp_p
     view = read_result(tmp_path / "a.h5")
     assert view.status == "interrupted"
     assert len(view.under("iterations")["combined"]) - 1 == int(["3", *words][-2])
+
+
+class GrazingAtTheEnd(FakeEngineWithEvaluations):
+    """An engine whose final design touches only just."""
+
+    def evaluate(self, *args: Any, **options: Any) -> Any:
+        found: Any = super().evaluate(*args, **options)
+        found.status, found.message = Status.GRAZING, "member 3 of group belts"
+        return found
+
+
+def test_what_a_final_design_lacks_is_one_warning_with_the_member(tmp_path: Path) -> None:
+    outcome = run_session(limited(hand_made_case(), 2), path=tmp_path / "a.h5", engine=GrazingAtTheEnd)
+    (told,) = (each for each in outcome.warnings if "member 3" in each)
+    assert told == f"the sensitivities of the final design: {Status.GRAZING.value}: member 3 of group belts"
