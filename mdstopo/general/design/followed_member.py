@@ -11,6 +11,10 @@ from mdstopo.general.model.priced_candidates import NODE, NODES, POWERS
 from mdstopo.mechanics.kinematics.kinematics_interface import ALONG, ELONGATION, RATE
 from mdstopo.mechanics.laws.law_table import law, law_is_idle, law_margin, law_next, law_set
 
+#: the highest power of time that virtual changes within a step have, and stages from which on they have it
+HIGHEST, MANY = 3, 8
+#: Legendre's polynomials at the nodes by degree, each times what its moment over a step counts
+AT_NODES = np.polynomial.legendre.legvander(2.0 * NODE - 1.0, HIGHEST) * (2.0 * np.arange(HIGHEST + 1) + 1.0)
 #: points and weights of an integral over a piece of a step, as fractions of it (Gauss)
 GAUSS = 0.5 * np.array(np.polynomial.legendre.leggauss(5)) + np.array([[0.5], [0.0]])
 #: what is known of a member at the nodes: the first rows of `member_works`, ELONGATION, RATE and ALONG
@@ -26,6 +30,12 @@ CLOSE = 1e-6
 #: a mode is over where its margin is below zero by more than rounding, this part of 1 m and the member's length: right
 #: behind a switch the margin of the new mode is zero, and nodes there would end it again
 ROUNDING = 4e-15
+
+
+@part
+def degree_of(stages):
+    """Of which degree the virtual changes are within a step of so many stages."""
+    return HIGHEST if stages >= MANY else min(stages - 1, HIGHEST - 1)
 
 
 @part
