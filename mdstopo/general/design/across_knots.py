@@ -35,15 +35,18 @@ from mdstopo.general.model.general_model import (
     START,
 )
 from mdstopo.general.model.priced_candidates import NODE, NODES
-from mdstopo.general.steps.step_history import FIRST, SEGMENT, copy_vector
+from mdstopo.general.steps.step_history import FIRST, SEGMENT
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     ALONG,
     ELONGATION,
+    INVERSE,
     RATE,
+    WORKS,
     drive_state,
     freedoms,
     member_motion,
     member_work,
+    member_works,
     pose_acceleration,
     pose_size,
     quintic,
@@ -169,15 +172,20 @@ def _add_followed(model, history, w, member_state, rel, u, weights, out):
     power = np.empty((NODE_ROWS, NODES))
     pieces = np.zeros((CHANGES + 1, PIECE))
     no_level = np.zeros(NODES)
+    works = np.empty((NODES, WORKS, model.member.shape[1]))
+    still = np.zeros(freedoms(model))
     for k in range(model.block.shape[0]):
         if not _has_knots(model, k, segment):
             continue
         p = model.block[k, PAIR]
         code = model.block[k, CODE]
-        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+        lo = model.block[k, START]
+        for c in range(NODES):
+            member_works(model, lo, model.block[k, COUNT], poses[c, p], still, works[c])
+        for i in range(lo, lo + model.block[k, COUNT]):
             if not _is_followed(member_state, i):
                 continue
-            last = _follow(model, k, i, time, poses[:, p], acc[p], node, power, pieces)
+            last = _follow(model, k, i, time, poses[0, p], acc[p], works[:, :, i - lo], node, power, pieces)
             if last == 0:
                 continue
             _subtract_stages(model, k, i, history.when[o : o + stages], rel[:, p], u[:, :, p], weights, out)
@@ -265,13 +273,14 @@ def _fill_changes(share, u, out):
                         out[m, c, p, d] += share[c, j] * u[m, j, p, d]
 
 
-@kernel
-def _follow(model, k, i, time, poses, acc, node, power, pieces):
+@part
+def _follow(model, k, i, time, pose, acc, works, node, power, pieces):
     """The pieces of its law that member i of block k goes through in a step.
 
     model: the compiled scene.
     time (2,): start and length of the step (s).
-    poses (NODES, POSE): of its pair at the nodes. acc (D,): the second derivative at the first one.
+    pose (POSE,), acc (D,): of its pair at the first node, with the second derivative.
+    works (NODES, WORKS): of `member_works` at the nodes.
     node (NODE_ROWS, NODES): out, ELONGATION and RATE.
     power, pieces: of `followed_member.follow`, out.
 
@@ -281,16 +290,29 @@ def _follow(model, k, i, time, poses, acc, node, power, pieces):
     p = model.law[k]
     curves = model.curves
     rest = model.member[MEMBER_FREE_LENGTH, i]
+    low = np.inf
+    high = -np.inf
     for c in range(NODES):
-        length, node[ELONGATION, c], node[RATE, c] = member_motion(model, i, poses[c])
-        if not length > 0.0:
+        if works[c, INVERSE] == 0.0:
             return 0
-    x = node[ELONGATION, 0]
-    rate = node[RATE, 0]
-    mode = np.int64(law_start(code, p, x, rate, 0.0, time[0], curves, rest))
-    if not law_margin(code, p, x, rate, mode, time[0], curves, rest) > CLOSE:
-        second = second_rate(model, i, poses[0], acc)
-        mode = np.int64(law_start(code, p, x, rate, second, time[0], curves, rest))
+        low = min(low, works[c, ELONGATION])
+        high = max(high, works[c, ELONGATION])
+    x = works[0, ELONGATION]
+    rate = works[0, RATE]
+    start = time[0]
+    mode = np.int64(law_start(code, p, x, rate, 0.0, start, curves, rest))
+    # a piece is a range of elongations
+    if (
+        law_margin(code, p, low, rate, mode, start, curves, rest) >= 0.0
+        and law_margin(code, p, high, rate, mode, start, curves, rest) >= 0.0
+    ):
+        return 0
+    if not law_margin(code, p, x, rate, mode, start, curves, rest) > CLOSE:
+        second = second_rate(model, i, pose, acc)
+        mode = np.int64(law_start(code, p, x, rate, second, start, curves, rest))
+    for c in range(NODES):
+        node[ELONGATION, c] = works[c, ELONGATION]
+        node[RATE, c] = works[c, RATE]
     return follow(code, p, curves, rest, time, mode, 0.0, node, power, pieces)
 
 
