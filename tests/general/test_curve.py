@@ -114,21 +114,20 @@ def test_the_gradient_by_an_alpha_of_zero_keeps_the_tolerance():
 
 
 @pytest.mark.parametrize("method", ["adjoint", "direct"])
-@pytest.mark.parametrize("integrator", ["runge_kutta", "esdirk"])
-def test_gradients_by_alphas_of_zero_of_many_curves_keep_the_tolerance(method, integrator):
-    """Steps pass over their knots, and were summed across them: by a ten-thousandth off, of the energy by more.
+def test_gradients_by_alphas_of_zero_of_many_curves_keep_the_tolerance(method):
+    """Steps pass over their knots. Sums of stages across these were off by 1.6e-5 and, of energies, by 2e-6 and 7e-7.
 
     At the smaller tolerance steps end at all knots.
     """
     stored = {name: {"response": "energy", "over_time": name} for name in ("mean", "rms")}
     alpha = np.zeros(60)
     alpha[[0, 1, 30, 31]] = 0.5
-    found = evaluate(hung(60, stored, integrator=integrator, tolerance=1e-6), alpha, method=method)
+    found = evaluate(hung(60, stored, tolerance=1e-6), alpha, method=method)
     right = evaluate(hung(60, stored, tolerance=1e-12), alpha)
     assert found.work["sums_of_switches"] < right.work["sums_of_switches"]
     for name, gradient in right.gradients.items():
         off = np.abs(found.gradients[name] - gradient)[alpha == 0.0].max()
-        assert off < 5e-6 * np.abs(gradient).max(), name
+        assert off < 3e-7 * np.abs(gradient).max(), name
 
 
 def test_of_many_members_steps_end_at_knots_of_those_that_carry_load():
