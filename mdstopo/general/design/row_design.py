@@ -58,14 +58,7 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
     n_pair = model.pair.shape[0]
     rel = poses_of_stages(model, history, o, stages)
     u = np.empty((count, stages, n_pair, freedoms(model)))
-    carries = carriers(model)
-    for j in range(stages):
-        for p in range(n_pair):
-            if carries[p] != 0:
-                for m in range(count):
-                    pair_displacement(model, rel[j], p, z[m, j], u[m, j, p])
-                    for i in range(freedoms(model)):
-                        u[m, j, p, i] = -u[m, j, p, i]
+    changes_of_pairs(model, rel, z, u)
     add_members_of_rows(model, segment, history, o, member_state, rel, u, out, work)
     for k in range(model.block.shape[0]):
         if model.block[k, CODE] == INERTER and model.block[k, DESIGN] >= 0 and model.active[segment, k] != 0:
@@ -77,6 +70,24 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
     if model.apart.shape[0] > 0:
         for j in range(stages):
             add_numbers_of_rows(model, segment, history, o + j, z, j, out)
+
+
+@kernel
+def changes_of_pairs(model, rel, z, u):
+    """What virtual displacements do to the relative poses of pairs that carry more than joints, with the sign turned.
+
+    model: the compiled scene.
+    rel (S, n_pair, POSE): relative poses at S states. z (R, S or more, n): virtual displacements there, of R rows.
+    u (R, S, n_pair, D): out, -T z.
+    """
+    carries = carriers(model)
+    for j in range(rel.shape[0]):
+        for p in range(rel.shape[1]):
+            if carries[p] != 0:
+                for m in range(u.shape[0]):
+                    pair_displacement(model, rel[j], p, z[m, j], u[m, j, p])
+                    for i in range(freedoms(model)):
+                        u[m, j, p, i] = -u[m, j, p, i]
 
 
 @kernel

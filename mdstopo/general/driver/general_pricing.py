@@ -8,6 +8,7 @@ import numpy as np
 from mdstopo.case.laws import Law
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.compiler.threads import allowed
+from mdstopo.general.design.followed_member import AT_NODES, HIGHEST, MANY
 from mdstopo.general.driver.row_gradients import sign_of, wanted_rows
 from mdstopo.general.model.general_model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
 from mdstopo.general.model.priced_candidates import (
@@ -42,8 +43,6 @@ from mdstopo.sensitivity.tile_interpolation import PLACES, ROOM
 if TYPE_CHECKING:
     from mdstopo.general.driver.general_driver import GeneralDriver
 
-#: the highest power of time that virtual changes within a step have, and stages from which on they have it
-HIGHEST, MANY = 3, 8
 #: by how much of the simulated time it is before the end of a step that decides in which mode a candidate is there: a
 #: built one switches there at most by rounding earlier
 SIDE = 1e-8
@@ -430,8 +429,7 @@ def _between_stages(values: FloatArray, when: FloatArray, stages: slice, begin: 
     degree = HIGHEST if len(own) >= MANY else min(len(own) - 1, HIGHEST - 1)
     fraction = (when[stages] - begin) / length
     at_stages = np.polynomial.legendre.legvander(2.0 * fraction - 1.0, degree)
-    at_nodes = np.polynomial.legendre.legvander(2.0 * NODE - 1.0, degree) * (2.0 * np.arange(degree + 1) + 1.0)
-    found: FloatArray = np.tensordot(at_nodes @ at_stages.T, own, axes=1)
+    found: FloatArray = np.tensordot(AT_NODES[:, : degree + 1] @ at_stages.T, own, axes=1)
     return found
 
 

@@ -220,7 +220,8 @@ def set_modes(model, member_state, rel, rel_rate, most_knotted):
 
     Where steps end at the knots of a curve, its pieces are modes; else it has none. That is so of members that carry
     load where there are few of these, and, for the derivatives by their alphas, of the others too where there are few
-    members with curves in all; of small groups always.
+    members with curves in all; of small groups always. The derivatives by all others that carry no load follow them
+    through their knots within a step (`design.across_knots`).
 
     model: the compiled scene.
     member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member; the scales are read.

@@ -10,6 +10,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, larger, load, negative, zero
+from mdstopo.general.design.followed_member import CLOSE
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODES
 from mdstopo.general.pricing.certain_modes import (
     FASTEST,
@@ -46,7 +47,7 @@ from mdstopo.general.pricing.sorted_members import (
     join_class,
     try_mode,
 )
-from mdstopo.general.pricing.switching_prices import CLOSE, NO_REST
+from mdstopo.general.pricing.switching_prices import NO_REST
 from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, rotations
 from mdstopo.mechanics.laws.law_table import law_start
 from mdstopo.sensitivity.tile_interpolation import BROAD

@@ -14,12 +14,13 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import WIDE, lanes, larger, load, negative, zero
+from mdstopo.general.design.followed_member import CLOSE
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODE, NODES
 from mdstopo.general.pricing.certain_modes import NARROW, UNSURE
 from mdstopo.general.pricing.loaded_members import take_members
-from mdstopo.general.pricing.switching_prices import CLOSE, NO_REST, range_of
+from mdstopo.general.pricing.switching_prices import NO_REST, range_of
 from mdstopo.general.pricing.switching_together import is_quick
 from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, RATE, WORKS, member_works
 from mdstopo.mechanics.laws.law_table import (

@@ -12,9 +12,10 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import inverse_root, lanes, load, store, zero
+from mdstopo.general.design.followed_member import GAUSS, LOCATED, NODE_ROWS, ROUNDING
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, MOVES, NODE, NODES, POWERS
-from mdstopo.general.pricing.switching_prices import GAUSS, LOCATED, NODE_ROWS, ROUNDING, at_places, fill_law, range_of
+from mdstopo.general.pricing.switching_prices import at_places, fill_law, range_of
 from mdstopo.mechanics.kinematics.kinematics_interface import ALONG, ELONGATION, RATE, WORKS, member_works
 from mdstopo.mechanics.laws.law_table import (
     law,

@@ -10,6 +10,7 @@ T z). An event on the way changes the cotangents by saltation (`events`); a peak
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.general.design.across_knots import add_across_knots, add_energies_across_knots
 from mdstopo.general.design.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.design.parameters import add_event, add_times, event_slope
 from mdstopo.general.dynamics.accelerations import (
@@ -150,6 +151,7 @@ def sweep(
         restore_modes(history, history.index[w, EVENTS], member_state)
         segment = history.index[w, SEGMENT]
         add_designs(model, segment, history, o, member_state, z[0, : end - o], out, work)
+        add_across_knots(model, history, w, member_state, z, out.reshape((1, out.shape[0])))
         if virtual.shape[0] > 0:
             virtual[o:end] = z[0, : end - o]
         if bar_set.shape[0] > 0:
@@ -616,6 +618,7 @@ def integral_cotangents(
     own = np.zeros((3, n))
     own_rows = np.zeros(n_row)
     weight = np.zeros(17)
+    of_energy = np.zeros(17)
     total = 0.0
     out[:] = 0.0
     none = np.zeros(n)
@@ -656,7 +659,8 @@ def integral_cotangents(
                     size,
                     tied,
                 )
-        for i in range(history.index[w + 1, FIRST] - o):
+        of_energy[:] = 0.0
+        for i in range(stages):
             if weight[i] == 0.0:
                 continue
             q = history.stage_q[o + i]
@@ -684,6 +688,7 @@ def integral_cotangents(
                 weighed = energy_weight(model, j, of_parts)
                 if weighed != 0.0:
                     add_design(model, segment, t, member_state, q, v, a, none, factor * weighed, out, work)
+                    of_energy[i] = factor * weighed
                     if energies.shape[0] > 0:
                         energies[o + i] = factor * weighed
             shares = ties if who == mine and ties > 1 else 1
@@ -708,4 +713,6 @@ def integral_cotangents(
                     add_response_sets(
                         model, member_state, segment, j, who, of_parts, t, q, v, a, own, factor, sets_bar[o + i]
                     )  # fmt: skip
+        if of_energy.any():
+            add_energies_across_knots(model, history, w, member_state, of_energy[:stages], out)
     return total

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel, part
+from mdstopo.general.design.across_knots import add_across_knots
 from mdstopo.general.design.gather import add_designs
 from mdstopo.general.design.parameters import add_times
 from mdstopo.general.design.row_design import add_designs_of_rows
@@ -194,6 +195,7 @@ def through_step(
         add_designs(model, segment, history, o, member_state, z[0, :stages], out[0], work)
     else:
         add_designs_of_rows(model, segment, history, o, stages, member_state, z, out, work)
+    add_across_knots(model, history, w, member_state, z, out)
     if bar_set.shape[1] > 0:
         for j in range(stages):
             add_sets_of_rows(model, segment, member_state, history, o + j, z, j, bar_set)

@@ -10,6 +10,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, load, store, zero
+from mdstopo.general.design.across_knots import add_across_knots, add_changes_across_knots
 from mdstopo.general.design.gather import fill_poses
 from mdstopo.general.design.row_design import add_designs_of_rows, add_members_of_rows
 from mdstopo.general.model.general_model import CODE, DESIGN, INERTER, PAIR
@@ -309,8 +310,10 @@ def add_forces(model, history, w, member_state, step, by_force, by_pose, out, wo
     segment = history.index[w, SEGMENT]
     if by_pose.shape[0] == 0:
         add_designs_of_rows(model, segment, history, o, s, member_state, by_force, out, work)
+        add_across_knots(model, history, w, member_state, by_force, out)
     else:
         add_members_of_rows(model, segment, history, o, member_state, step.rel[:s], by_pose, out, work)
+        add_changes_across_knots(model, history, w, member_state, step.rel[:s], by_pose, out)
 
 
 @kernel
