@@ -13,11 +13,11 @@ from mdstopo.general.pricing.certain_modes import (
     FASTEST,
     FREE,
     HIGH,
-    LINEAR_NUMBERS,
     LOCAL,
     LOW,
     PART_NUMBERS,
     REACH,
+    SERIES_NUMBERS,
     SLOWEST,
     STATED,
     _fill_bounds,
@@ -92,7 +92,7 @@ def bounds(kinematics, points, stated, rest, r):
     _fill_part(rest, line, rows, sum(off), number, w)
     frame = _frames(kinematics, r[None])
     return (
-        bound if _fill_bounds(axes, frame, 0, line, rows, number, w, np.zeros(LINEAR_NUMBERS), bound) else None
+        bound if _fill_bounds(axes, frame, 0, line, rows, number, w, np.zeros(SERIES_NUMBERS), bound) else None
     ), number
 
 
