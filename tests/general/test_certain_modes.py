@@ -13,13 +13,24 @@ from mdstopo.general.pricing.certain_modes import (
     FASTEST,
     FREE,
     HIGH,
-    LINEAR_NUMBERS,
     LOCAL,
     LOW,
     PART_NUMBERS,
     REACH,
+    SERIES_NUMBERS,
     SLOWEST,
     STATED,
+    V_OFF,
+    V_Q,
+    V_S,
+    X_OFF,
+    X_Q,
+    X_QQ,
+    X_S,
+    X_SQ,
+    X_SS,
+    V,
+    X,
     _fill_bounds,
     _fill_line,
     _fill_part,
@@ -80,7 +91,7 @@ def drawn(kinematics, rng, size, bent):
 
 
 def bounds(kinematics, points, stated, rest, r):
-    """Bounds by the kernels, or None, and the part's numbers."""
+    """Bounds by the kernels, or None, the part's numbers, and its series."""
     axes = points[0].shape[1]
     rows, line, number = np.zeros((2, 2, axes)), np.zeros((2, 2, axes)), np.zeros(PART_NUMBERS)
     off = [0.0, 0.0]
@@ -88,12 +99,11 @@ def bounds(kinematics, points, stated, rest, r):
         for side, out in ((0, rows), (1, line)):
             grid = np.ascontiguousarray(grids[side].T)
             off[side] = max(off[side], _fill_line(grid, 0, grid.shape[1], out[which]))
-    w, bound = np.zeros((4, axes)), np.zeros(4)
+    w, bound, series = np.zeros((4, axes)), np.zeros(4), np.zeros(SERIES_NUMBERS)
     _fill_part(rest, line, rows, sum(off), number, w)
     frame = _frames(kinematics, r[None])
-    return (
-        bound if _fill_bounds(axes, frame, 0, line, rows, number, w, np.zeros(LINEAR_NUMBERS), bound) else None
-    ), number
+    found = _fill_bounds(axes, frame, 0, line, rows, number, w, series, bound)
+    return bound if found else None, number, series
 
 
 @pytest.mark.usefixtures("in_python")
@@ -105,7 +115,7 @@ def test_every_member_of_a_part_is_within_its_bounds(kinematics, seed, size, ben
     points, stated = drawn(kinematics, rng, 10.0**size, bent)
     rest = -1.0 if is_stated else 0.8
     r = random_pose(kinematics, rng)
-    bound, number = bounds(kinematics, points, stated, rest, r)
+    bound, number, _ = bounds(kinematics, points, stated, rest, r)
     length, rate = moved(kinematics, *points, r)
     free = np.linalg.norm(stated[1] - stated[0][:, None], axis=2) if is_stated else np.full(length.shape, rest)
     if bound is None:
@@ -127,13 +137,36 @@ def test_bounds_are_wider_than_what_members_do_by_the_square_of_the_part(kinemat
         rng = np.random.default_rng(3)
         points, stated = drawn(kinematics, rng, size, 0.0)
         r = random_pose(kinematics, rng)
-        bound, number = bounds(kinematics, points, stated, -1.0, r)
+        bound, number, _ = bounds(kinematics, points, stated, -1.0, r)
         length, rate = moved(kinematics, *points, r)
         x = length - np.linalg.norm(stated[1] - stated[0][:, None], axis=2)
         assert number[BULGE] <= 1e-15
         assert bound[HIGH] - bound[LOW] <= 1.1 * np.ptp(x)
         over.append([bound[HIGH] - bound[LOW] - np.ptp(x), bound[FASTEST] - bound[SLOWEST] - np.ptp(rate)])
     assert (np.array(over[1]) <= 0.02 * np.array(over[0])).all()
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("is_stated", [False, True], ids=["free length", "as stated"])
+@pytest.mark.parametrize("kinematics", [PLANAR, SPATIAL], ids=["plane", "space"])
+def test_the_series_of_a_member_is_off_by_the_cube_of_the_part_in_elongation_and_the_square_in_rate(
+    kinematics, is_stated
+):
+    allowed = []
+    for size in (1e-1, 1e-2):
+        rng = np.random.default_rng(3)
+        points, stated = drawn(kinematics, rng, size, 0.0)
+        r = random_pose(kinematics, rng)
+        _, _, series = bounds(kinematics, points, stated, -1.0 if is_stated else 0.8, r)
+        length, rate = moved(kinematics, *points, r)
+        free = np.linalg.norm(stated[1] - stated[0][:, None], axis=2) if is_stated else 0.8
+        q, s = np.linspace(-1.0, 1.0, len(points[0]))[:, None], np.linspace(-1.0, 1.0, len(points[1]))
+        x = series[X] + series[X_S] * s + series[X_Q] * q
+        x = x + series[X_SS] * s**2 + series[X_SQ] * s * q + series[X_QQ] * q**2
+        assert np.abs(x - (length - free)).max() <= series[X_OFF]
+        assert np.abs(series[V] + series[V_S] * s + series[V_Q] * q - rate).max() <= series[V_OFF]
+        allowed.append([series[X_OFF], series[V_OFF]])
+    assert (np.array(allowed[1]) <= np.array([2e-3, 2e-2]) * np.array(allowed[0])).all()
 
 
 @pytest.mark.usefixtures("in_python")

@@ -4,18 +4,20 @@ The first points of a tile, and the second ones of each of its parts, lie near l
 further than a bulge beside it. With the vector d = d_0 + S q - p between the ends at a relative pose, of length L and
 direction e in the middle of both lines, any other vector d + w has the length
 
-    L + e . w <= |d + w| <= L + e . w + |w_across|^2 / (2 (L - |w|)),
+    |d + w| = L + e . w + |w_across|^2 / (2 L)    +- 0.2 |w|^3 / (L - |w|)^2
 
-and its direction differs from e + w_across / L by less than 0.6 |w|^2 / (L - |w|)^2 (half the second derivative of
-d / |d|, which is at most 2 / sqrt(3)), and from e by |w| / (L - |w|) at most. The rate of its length is that direction
-times its velocity, which is v = d_0' + S' q in the middle, and v + S' h where the second point is off by h. With a
-reach r that neither |w| nor |h| exceeds, the rate is
+(a sixth of the third derivative of |d| by a vector w at an angle a to it, -3 |w|^3 cos(a) sin(a)^2 / |d|^2, is at most
+0.1925 |w|^3 / |d|^2), and its direction differs from e + w_across / L by less than 0.6 |w|^2 / (L - |w|)^2 (half the
+second derivative of d / |d|, which is at most 2 / sqrt(3)), and from e by |w| / (L - |w|) at most. The rate of its
+length is that direction times its velocity, which is v = d_0' + S' q in the middle, and v + S' h where the second point
+is off by h. With a reach r that neither |w| nor |h| exceeds, the rate is
 
     e . v + e . S' h + w_across . v / L    +- (0.6 |v| r^2 / (L - r)^2 + |S'| r^2 / (L - r)).
 
-What is linear in the s of both points is largest where these are 1 or -1. A bulge b adds b to the length, and
-b (|v| / L + |S'|) to the rate. So elongations and rates have bounds whose width beyond the linear part falls with the
-square of the part. Bounds of a margin follow where it is the least of linear functions: at the corners.
+So the elongation, less a free length that is a distance itself, is a polynomial of the second degree in the s of both
+points, and the rate is linear in these, but for remainders. Each term is largest and least at an end of its range. A
+bulge b adds b to the length, and b (|v| / L + |S'|) to the rate. Bounds of a margin follow where it is the least of
+linear functions of elongation and rate: at the corners.
 
 Of a single member the s of its points are known, so that its own bounds are as narrow as the remainder
 (`sorted_by_lines`). For these the first points are on two lines: where they are a row of a surface, a tile may have the
@@ -61,16 +63,18 @@ ROWS_OF_ALL = BOUND_PARTS
 #: points in body frames, and where their case has them; the middle of their line, and half of it
 LOCAL, STATED = range(2)
 MIDDLE, HALF = range(2)
-#: of a part: the free length in the middle; by how much it changes along the second and the first points; by how much
-#: it may be longer than that; how far its vectors differ from that in the middle, and how far points are from lines (m)
-PART_NUMBERS = 6
-FREE, FREE_SECOND, FREE_FIRST, FREE_MORE, REACH, BULGE = range(PART_NUMBERS)
+#: the third-order remainder of a length is at most so many times |w|^3 / (L - |w|)^2
+THIRD = 0.2
+#: of a part: the series of the free length in the places of both points on their lines, s of the second and q of the
+#: first: the terms of 1, s, q, s^2, s q, q^2; how far it may be off; how far the part's vectors differ from that in the
+#: middle, and how far points are from lines (m)
+PART_NUMBERS = 9
+FREE, FREE_S, FREE_Q, FREE_SS, FREE_SQ, FREE_QQ, FREE_OFF, REACH, BULGE = range(PART_NUMBERS)
 #: bounds of elongations and rates
 LOW, HIGH, SLOWEST, FASTEST = range(4)
-#: elongation and rate as linear functions of the places of both points on their lines: in the middle, and by how much
-#: they change along the second and the first line; how far the elongation may be below and above, and the rate from it
-LINEAR_NUMBERS = 9
-X, X_SECOND, X_FIRST, X_LESS, X_MORE, V, V_SECOND, V_FIRST, V_OFF = range(LINEAR_NUMBERS)
+#: the series of elongation and rate in these places, and how far both may be off
+SERIES_NUMBERS = 11
+X, X_S, X_Q, X_SS, X_SQ, X_QQ, X_OFF, V, V_S, V_Q, V_OFF = range(SERIES_NUMBERS)
 #: lines of a tile's first points by which single members are told; level of the largest parts for these, and where
 #: they begin among the parts of all levels
 ROW_LINES = 2
@@ -89,7 +93,7 @@ LEAVES = -2
 
 #: the arrays of `Spans`
 SPANS = (
-    "line", "number", "w", "bound", "linear", "row_line", "row_number", "row_place", "column_place", "split",
+    "line", "number", "w", "bound", "series", "row_line", "row_number", "row_place", "column_place", "split",
 )  # fmt: skip
 
 
@@ -97,7 +101,7 @@ class Spans:
     """Where the points of a tile's parts are, inside kernels, and scratch for bounds of what their members do.
 
     line (BOUND_PARTS + 1, LOCAL or STATED, MIDDLE or HALF, axes): of the second points of each part, and last of all
-    first points. number (BOUND_PARTS, PART_NUMBERS): of the parts. w (4, axes), bound (4,), linear (LINEAR_NUMBERS,):
+    first points. number (BOUND_PARTS, PART_NUMBERS): of the parts. w (4, axes), bound (4,), series (SERIES_NUMBERS,):
     scratch. For single members: row_line (ROW_LINES, 2, 2, axes): the lines of first points. row_number (ROW_LINES,
     LINED_PARTS, PART_NUMBERS): of parts with each of these. row_place (TALL,), column_place (levels, BROAD): where
     points are on their lines, from -1 to 1. split (1,): the first row of the second line.
@@ -117,7 +121,7 @@ def make_spans(axes):
         np.zeros((BOUND_PARTS, PART_NUMBERS)),
         np.zeros((4, axes)),
         np.zeros(4),
-        np.zeros(LINEAR_NUMBERS),
+        np.zeros(SERIES_NUMBERS),
         np.zeros((ROW_LINES, 2, 2, axes)),
         np.zeros((ROW_LINES, LINED_PARTS, PART_NUMBERS)),
         np.zeros(TALL),
@@ -278,10 +282,8 @@ def _fill_part(rest, line, rows, bulge, number, w):
         first += rows[STATED, HALF, d] ** 2
     number[REACH] = math.sqrt(second) + math.sqrt(first) + bulge
     number[BULGE] = bulge
+    number[FREE:REACH] = 0.0
     number[FREE] = rest
-    number[FREE_SECOND] = 0.0
-    number[FREE_FIRST] = 0.0
-    number[FREE_MORE] = 0.0
     if rest >= 0.0:
         return
     length = math.sqrt(square)
@@ -290,50 +292,63 @@ def _fill_part(rest, line, rows, bulge, number, w):
         return
     by_second = 0.0
     by_first = 0.0
+    both = 0.0
     for d in range(line.shape[2]):
         by_second += w[0, d] * line[STATED, HALF, d] / length
         by_first += w[0, d] * rows[STATED, HALF, d] / length
+        both += line[STATED, HALF, d] * rows[STATED, HALF, d]
     number[FREE] = length
-    number[FREE_SECOND] = by_second
-    number[FREE_FIRST] = by_first
-    across = (second - by_second * by_second) + (first - by_first * by_first) + bulge * bulge
-    number[FREE_MORE] = 1.5 * across / (length - number[REACH])
+    number[FREE_S] = by_second
+    number[FREE_Q] = -by_first
+    number[FREE_SS] = 0.5 * (second - by_second * by_second) / length
+    number[FREE_SQ] = (by_second * by_first - both) / length
+    number[FREE_QQ] = 0.5 * (first - by_first * by_first) / length
+    number[FREE_OFF] = _third_order(number[REACH], length)
 
 
 @part
-def _fill_bounds(axes, frame, at_row, line, rows, number, w, linear, bound):
+def _third_order(reach, length):
+    """How far a length may be from its series to the second order.
+
+    reach, length: how far vectors are from the one in the middle at most, and its length, which is larger (m).
+    """
+    return THIRD * reach * reach * reach / ((length - reach) * (length - reach))
+
+
+@part
+def _fill_bounds(axes, frame, at_row, line, rows, number, w, series, bound):
     """Bounds of elongations (m) and rates (m/s) of all members of a part at a relative pose.
 
-    axes, frame, at_row, line, rows, number: as of `fill_linear`.
-    bound (4,): set. w (4, axes), linear (LINEAR_NUMBERS,): scratch.
+    axes, frame, at_row, line, rows, number: as of `fill_series`.
+    bound (4,): set. w (4, axes), series (SERIES_NUMBERS,): scratch.
 
     Returns whether there are any: not where ends may meet.
     """
-    if not fill_linear(axes, frame, at_row, line, rows, number, w, linear):
+    if not fill_series(axes, frame, at_row, line, rows, number, w, series):
         return False
-    fill_bound(linear, bound)
+    fill_bound(series, bound)
     return True
 
 
 @part
-def fill_bound(linear, bound):
-    """Bounds of linear functions of the places of both points on their lines.
+def fill_bound(series, bound):
+    """Bounds of elongations and rates with some series, wherever both points are on their lines.
 
-    linear (LINEAR_NUMBERS,): of `fill_linear`.
+    series (SERIES_NUMBERS,): of `fill_series`.
     bound (4,): set.
     """
-    spread = abs(linear[X_SECOND]) + abs(linear[X_FIRST])
-    bound[LOW] = linear[X] - spread - linear[X_LESS]
-    bound[HIGH] = linear[X] + spread + linear[X_MORE]
-    spread = abs(linear[V_SECOND]) + abs(linear[V_FIRST]) + linear[V_OFF]
-    bound[SLOWEST] = linear[V] - spread
-    bound[FASTEST] = linear[V] + spread
+    spread = abs(series[X_S]) + abs(series[X_Q]) + abs(series[X_SQ]) + series[X_OFF]
+    bound[LOW] = series[X] - spread + min(series[X_SS], 0.0) + min(series[X_QQ], 0.0)
+    bound[HIGH] = series[X] + spread + max(series[X_SS], 0.0) + max(series[X_QQ], 0.0)
+    spread = abs(series[V_S]) + abs(series[V_Q]) + series[V_OFF]
+    bound[SLOWEST] = series[V] - spread
+    bound[FASTEST] = series[V] + spread
 
 
 @part
-def fill_linear(axes, frame, at_row, line, rows, number, w, linear):
-    """Elongations (m) and rates (m/s) of all members of a part at a relative pose, as linear functions of where their
-    points are on the lines, and how far they may be from these.
+def fill_series(axes, frame, at_row, line, rows, number, w, series):
+    """Elongations (m) and rates (m/s) of all members of a part at a relative pose, as series in the places of their
+    points on the lines, and how far they may be from these.
 
     Constant:
       axes: 2 in a plane, 3 in space.
@@ -342,7 +357,7 @@ def fill_linear(axes, frame, at_row, line, rows, number, w, linear):
       line, rows (2, 2, axes): lines of the part's second points and of the first.
       number (PART_NUMBERS,): of the part.
     Out:
-      linear (LINEAR_NUMBERS,): set.
+      series (SERIES_NUMBERS,): set.
       w (4, axes): scratch.
 
     Returns whether there are any: not where ends may meet.
@@ -380,6 +395,7 @@ def fill_linear(axes, frame, at_row, line, rows, number, w, linear):
     swing = 0.0
     second_square = 0.0
     first_square = 0.0
+    both = 0.0
     second_rate = 0.0
     first_rate = 0.0
     speed = 0.0
@@ -391,6 +407,7 @@ def fill_linear(axes, frame, at_row, line, rows, number, w, linear):
         swing += w[0, d] * w[3, d]
         second_square += w[1, d] * w[1, d]
         first_square += half * half
+        both += w[1, d] * half
         second_rate += w[1, d] * w[2, d]
         first_rate += half * w[2, d]
         speed += w[2, d] * w[2, d]
@@ -399,20 +416,21 @@ def fill_linear(axes, frame, at_row, line, rows, number, w, linear):
     first *= inverse
     rate *= inverse
     bulge = number[BULGE]
-    across = (second_square - second * second) + (first_square - first * first) + bulge * bulge
     off = 2.0 * bulge + WIDER * (1.0 + length)
-    linear[X] = length - number[FREE]
-    linear[X_SECOND] = second - number[FREE_SECOND]
-    linear[X_FIRST] = number[FREE_FIRST] - first
-    linear[X_LESS] = off + number[FREE_MORE]
-    linear[X_MORE] = off + 1.5 * across / shortest
+    series[X] = length - number[FREE]
+    series[X_S] = second - number[FREE_S]
+    series[X_Q] = -first - number[FREE_Q]
+    series[X_SS] = 0.5 * (second_square - second * second) * inverse - number[FREE_SS]
+    series[X_SQ] = (second * first - both) * inverse - number[FREE_SQ]
+    series[X_QQ] = 0.5 * (first_square - first * first) * inverse - number[FREE_QQ]
+    series[X_OFF] = off + _third_order(reach, length) + number[FREE_OFF]
     turning = frame[at_row, spin_at + axes * axes]
     near = reach / shortest
-    linear[V] = rate
-    linear[V_SECOND] = (swing + second_rate - second * rate) * inverse
-    linear[V_FIRST] = (first * rate - first_rate) * inverse
+    series[V] = rate
+    series[V_S] = (swing + second_rate - second * rate) * inverse
+    series[V_Q] = (first * rate - first_rate) * inverse
     off = 0.6 * near * near * speed + near * turning * reach + bulge * (speed * inverse + turning)
-    linear[V_OFF] = off + WIDER * (1.0 + speed)
+    series[V_OFF] = off + WIDER * (1.0 + speed)
     return True
 
 
@@ -480,7 +498,7 @@ def modes_at_nodes(model, candidates, k, s, which, spans, mode):
     code = candidates.run[k, CODE]
     p = candidates.law[k]
     curves = model.curves
-    line, number, w, bound, linear = spans.line, spans.number, spans.w, spans.bound, spans.linear
+    line, number, w, bound, series = spans.line, spans.number, spans.w, spans.bound, spans.series
     rest = number[which, FREE]
     axes = freedoms(model) - rotations(model)
     for m in range(NODES):
@@ -488,7 +506,7 @@ def modes_at_nodes(model, candidates, k, s, which, spans, mode):
         o = candidates.step[s, FIRST_NODE] + m
         t = candidates.step_time[s, 0] + NODE[m] * candidates.step_time[s, 1]
         rows = line[ROWS_OF_ALL]
-        if not _fill_bounds(axes, candidates.node_frame, o, line[which], rows, number[which], w, linear, bound):
+        if not _fill_bounds(axes, candidates.node_frame, o, line[which], rows, number[which], w, series, bound):
             continue
         x = 0.5 * (bound[LOW] + bound[HIGH])
         rate = 0.5 * (bound[SLOWEST] + bound[FASTEST])
@@ -517,7 +535,7 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
     code = run[CODE]
     p = candidates.law[k]
     curves = model.curves
-    line, number, w, bound, linear = spans.line, spans.number, spans.w, spans.bound, spans.linear
+    line, number, w, bound, series = spans.line, spans.number, spans.w, spans.bound, spans.series
     rows = line[ROWS_OF_ALL]
     line = line[which]
     number = number[which]
@@ -536,7 +554,7 @@ def modes_in_step(model, candidates, k, u, which, mode, low, high, spans):
     sign = 0.0
     for m in range(1 if at_state else NODES):
         t = begin + NODE[m] * long
-        if not _fill_bounds(axes, frame, first + m, line, rows, number, w, linear, bound):
+        if not _fill_bounds(axes, frame, first + m, line, rows, number, w, series, bound):
             return UNSURE, UNSURE
         before = sign
         sign = 1.0 if bound[SLOWEST] > 0.0 else -1.0 if bound[FASTEST] < 0.0 else 0.0

@@ -1,7 +1,7 @@
 """Which members of a part of a tile stay in a mode in a step, from where their points are on lines.
 
-Elongation and rate of a member are linear in these places, but for a remainder that has a bound (`certain_modes`). So a
-margin that is the least of linear functions is above others that are linear in the places, and where these are above
+Elongation and rate of a member are polynomials in these places, but for a remainder that has a bound (`certain_modes`).
+So a margin that is the least of linear functions is above others that are such polynomials, and where these are above
 zero at all nodes of the step the member stays in the mode: a few sums and products for each, in vectors, while what it
 does is not computed. Only members near a switch are left to be looked at.
 """
@@ -15,24 +15,26 @@ from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODES
 from mdstopo.general.pricing.certain_modes import (
     FASTEST,
     HIGH,
-    LINEAR_NUMBERS,
     LINED_AT_ONCE,
     LINED_FIRST,
     LINED_LEVEL,
     LOW,
     ROW_LINES,
+    SERIES_NUMBERS,
     SLOWEST,
-    V_FIRST,
     V_OFF,
-    V_SECOND,
-    X_FIRST,
-    X_LESS,
-    X_MORE,
-    X_SECOND,
+    V_Q,
+    V_S,
+    X_OFF,
+    X_Q,
+    X_QQ,
+    X_S,
+    X_SQ,
+    X_SS,
     V,
     X,
     fill_bound,
-    fill_linear,
+    fill_series,
     rows_of_line,
 )
 from mdstopo.general.pricing.sorted_members import (
@@ -52,9 +54,10 @@ from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, rotation
 from mdstopo.mechanics.laws.law_table import law_start
 from mdstopo.sensitivity.tile_interpolation import BROAD
 
-#: functions below the margin of a mode at all nodes: the value in the middle, changes along the second and first line
-BELOW_NUMBERS = 3
-MIDDLE, ALONG_SECOND, ALONG_FIRST = range(BELOW_NUMBERS)
+#: functions below the margin of a mode at all nodes: polynomials in the places s and q of both points, the terms of
+#: 1, s, q, s^2, s q, q^2
+BELOW_NUMBERS = 6
+BY_1, BY_S, BY_Q, BY_SS, BY_SQ, BY_QQ = range(BELOW_NUMBERS)
 MOST_BELOW = NODES * CORNERS
 
 
@@ -80,15 +83,15 @@ def sort_by_lines(model, candidates, k, s, level, first, height, spans, sorting)
     inner = max(level, np.int64(LINED_LEVEL))
     size = BROAD >> inner
     parts = (BROAD >> level) // size
-    linear = np.empty((LINED_AT_ONCE, ROW_LINES, NODES, LINEAR_NUMBERS))
+    series = np.empty((LINED_AT_ONCE, ROW_LINES, NODES, SERIES_NUMBERS))
     box = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for at in range(parts):
         which = (1 << inner) - 1 + first // size + at
         for n in range(ROW_LINES):
             begin, behind = rows_of_line(n, height, spans.split)
-            if begin < behind and not _fill_nodes(model, candidates, s, which, n, spans, linear[at, n], box):
+            if begin < behind and not _fill_nodes(model, candidates, s, which, n, spans, series[at, n], box):
                 return np.int64(-1)
-    count = _modes_to_try(code, p, model.curves, candidates.step_time[s, 0], box, linear[:parts], tried)
+    count = _modes_to_try(code, p, model.curves, candidates.step_time[s, 0], box, series[:parts], tried)
     fill_tangents(code, p, model.curves, candidates.step_time[s, 0], box, count, tried, tangent)
     for a in range(height):
         kind[a * BROAD + first : a * BROAD + first + parts * size] = UNSORTED
@@ -104,7 +107,7 @@ def sort_by_lines(model, candidates, k, s, level, first, height, spans, sorting)
             for n in range(ROW_LINES):
                 begin, behind = rows_of_line(n, height, spans.split)
                 if begin < behind:
-                    functions = _fill_below(tangent[mode], linear[at, n], below)
+                    functions = _fill_below(tangent[mode], series[at, n], below)
                     classes[own, COUNT] += _sort_rows(
                         own, begin, behind, begins, functions, below, place, spans.row_place, kind
                     )
@@ -112,8 +115,8 @@ def sort_by_lines(model, candidates, k, s, level, first, height, spans, sorting)
 
 
 @kernel
-def _fill_nodes(model, candidates, s, which, n, spans, linear, box):
-    """Elongations and rates at the nodes of a step as linear functions.
+def _fill_nodes(model, candidates, s, which, n, spans, series, box):
+    """Elongations and rates at the nodes of a step as series.
 
     In:
       model: of which the kind counts.
@@ -122,7 +125,7 @@ def _fill_nodes(model, candidates, s, which, n, spans, linear, box):
     In place:
       box (4,): the least and the largest elongation (m), and the least and the largest rate (m/s): widened to these.
     Out:
-      linear (NODES, LINEAR_NUMBERS): set.
+      series (NODES, SERIES_NUMBERS): set.
       spans: a `Spans`, of which vectors and bounds are overwritten.
 
     Returns whether there are any: not where ends may meet.
@@ -130,8 +133,8 @@ def _fill_nodes(model, candidates, s, which, n, spans, linear, box):
     line, w, row_line, number, bound = spans.line, spans.w, spans.row_line, spans.row_number, spans.bound
     axes = freedoms(model) - rotations(model)
     for m in range(NODES):
-        own = linear[m]
-        if not fill_linear(
+        own = series[m]
+        if not fill_series(
             axes, candidates.node_frame, candidates.step[s, FIRST_NODE] + m, line[which], row_line[n],
             number[n, which - LINED_FIRST], w, own,
         ):  # fmt: skip
@@ -145,24 +148,24 @@ def _fill_nodes(model, candidates, s, which, n, spans, linear, box):
 
 
 @part
-def _modes_to_try(code, p, curves, t, box, linear, tried):
+def _modes_to_try(code, p, curves, t, box, series, tried):
     """Modes in which some members may be: at the corners of the range, and in the middle of every part.
 
     In:
       code, p (8,), curves, t: the law, numbers of all laws, and any time (s), on which the law does not depend.
       box (4,): of `_fill_nodes`.
-      linear (parts, ROW_LINES, NODES, LINEAR_NUMBERS): of the parts, of which the first line counts.
+      series (parts, ROW_LINES, NODES, SERIES_NUMBERS): of the parts, of which the first line counts.
     Out:
       tried (TRIED,): the modes.
 
     Returns how many there are.
     """
     count = np.int64(0)
-    for i in range(CORNERS + linear.shape[0] * NODES):
+    for i in range(CORNERS + series.shape[0] * NODES):
         x = box[i // 2 % 2]
         rate = box[2 + i % 2]
         if i >= CORNERS:
-            own = linear[(i - CORNERS) // NODES, 0, (i - CORNERS) % NODES]
+            own = series[(i - CORNERS) // NODES, 0, (i - CORNERS) % NODES]
             x = own[X]
             rate = own[V]
         now = np.int64(law_start(code, p, x, rate, 0.0, t, curves, NO_REST))
@@ -171,13 +174,12 @@ def _modes_to_try(code, p, curves, t, box, linear, tried):
 
 
 @part
-def _fill_below(tangent, linear, below):
-    """Linear functions of the places of points that are below the margin of a mode, less what rounding may be, at all
-    nodes.
+def _fill_below(tangent, series, below):
+    """Polynomials in the places of points that are below the margin of a mode, less what rounding may be, at all nodes.
 
     In:
       tangent (CORNERS, TANGENT_NUMBERS): of the margin.
-      linear (NODES, LINEAR_NUMBERS): of `_fill_nodes`.
+      series (NODES, SERIES_NUMBERS): of `_fill_nodes`.
     Out:
       below (MOST_BELOW, BELOW_NUMBERS): set.
 
@@ -194,12 +196,14 @@ def _fill_below(tangent, linear, below):
             alike = before[BY_ELONGATION] == by_x and before[BY_RATE] == by_rate
             known = known or (alike and before[AT_ZERO] <= own[AT_ZERO])
         for m in range(0 if known else NODES):
-            x = linear[m]
-            off = x[X_LESS] if by_x > 0.0 else x[X_MORE]
-            value = own[AT_ZERO] + by_x * x[X] + by_rate * x[V] - abs(by_x) * off - abs(by_rate) * x[V_OFF]
-            below[count, MIDDLE] = value - (CLOSE if m == 0 else SURE)
-            below[count, ALONG_SECOND] = by_x * x[X_SECOND] + by_rate * x[V_SECOND]
-            below[count, ALONG_FIRST] = by_x * x[X_FIRST] + by_rate * x[V_FIRST]
+            x = series[m]
+            value = own[AT_ZERO] + by_x * x[X] + by_rate * x[V] - abs(by_x) * x[X_OFF] - abs(by_rate) * x[V_OFF]
+            below[count, BY_1] = value - (CLOSE if m == 0 else SURE)
+            below[count, BY_S] = by_x * x[X_S] + by_rate * x[V_S]
+            below[count, BY_Q] = by_x * x[X_Q] + by_rate * x[V_Q]
+            below[count, BY_SS] = by_x * x[X_SS]
+            below[count, BY_SQ] = by_x * x[X_SQ]
+            below[count, BY_QQ] = by_x * x[X_QQ]
             count += 1
     return count
 
@@ -225,9 +229,9 @@ def _sort_rows(own, begin, behind, first, functions, below, place, row_place, ki
         least = np.inf
         most = np.inf
         for f in range(functions):
-            value = below[f, MIDDLE] + below[f, ALONG_FIRST] * row_place[a]
-            least = min(least, value - abs(below[f, ALONG_SECOND]))
-            most = min(most, value + abs(below[f, ALONG_SECOND]))
+            value, slope, square = _along_row(below[f], row_place[a])
+            least = min(least, value - abs(slope) + min(square, 0.0))
+            most = min(most, value + abs(slope) + max(square, 0.0))
         if not most > 0.0:
             continue
         for b in range(0, place.shape[0], lanes()):
@@ -236,11 +240,21 @@ def _sort_rows(own, begin, behind, first, functions, below, place, row_place, ki
                 at_column = load(place, b)
                 over = zero() - np.inf
                 for f in range(functions):
-                    value = below[f, MIDDLE] + below[f, ALONG_FIRST] * row_place[a]
-                    over = larger(over, zero() - (below[f, ALONG_SECOND] * at_column + value))
+                    value, slope, square = _along_row(below[f], row_place[a])
+                    over = larger(over, zero() - ((square * at_column + slope) * at_column + value))
                 bits = negative(over)
             for lane in range(lanes() if bits != 0 else 0):
                 if (bits >> lane) & 1 == 1 and kind[at + b + lane] == UNSORTED:
                     kind[at + b + lane] = own
                     count += 1
     return count
+
+
+@part
+def _along_row(below, q):
+    """A polynomial in the places of both points, for a row at the place q: the terms of 1, s and s^2.
+
+    below (BELOW_NUMBERS,): the polynomial.
+    """
+    value = below[BY_1] + (below[BY_Q] + below[BY_QQ] * q) * q
+    return value, below[BY_S] + below[BY_SQ] * q, below[BY_SS]

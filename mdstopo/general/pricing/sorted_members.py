@@ -14,13 +14,13 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import WIDE, lanes, larger, load, negative, zero
-from mdstopo.general.design.followed_member import CLOSE
+from mdstopo.general.design.followed_member import CLOSE, NODE_ROWS
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODE, NODES
 from mdstopo.general.pricing.certain_modes import NARROW, UNSURE
 from mdstopo.general.pricing.loaded_members import take_members
-from mdstopo.general.pricing.switching_prices import NO_REST, range_of
+from mdstopo.general.pricing.switching_prices import NO_REST, mode_at_start, range_of
 from mdstopo.general.pricing.switching_together import is_quick
 from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, RATE, WORKS, member_works
 from mdstopo.mechanics.laws.law_table import (
@@ -232,6 +232,7 @@ def sort_places(model, candidates, k, s, places, count, modes, known, begin, kep
     free = model.member[MEMBER_FREE_LENGTH]
     inside = np.zeros((TRIED, NODES), np.int64)
     outside = np.zeros((TRIED, NODES), np.int64)
+    node = np.empty((NODE_ROWS, NODES))
     mode[:] = UNSURE
     for at in range(0, count, MANY):
         wide = min(MANY, count - at)
@@ -245,6 +246,8 @@ def sort_places(model, candidates, k, s, places, count, modes, known, begin, kep
         for i in range(0, wide, lanes()):
             left = (1 << min(wide - i, lanes())) - 1
             _fill_masks(modes, i, sorting, inside, outside)
+            if modes > 0:
+                _begin_unclear(model, candidates, k, s, i, left, modes, sorting, inside, node)
             for old in range(modes):
                 for new in range(modes):
                     bits = _that_go(inside[old], outside[old], inside[new], old == new) & left
@@ -283,6 +286,35 @@ def _fill_masks(modes, i, sorting, inside, outside):
             margin = least_margin(tangent[n], x, rate)
             inside[n, m] = ~negative(margin - (CLOSE if m == 0 else SURE))
             outside[n, m] = negative(margin + SURE)
+
+
+@part
+def _begin_unclear(model, candidates, k, s, i, left, modes, sorting, inside, node):
+    """Find the modes of those members of a vector that begin a step near a switch, as all do whose curve has a knot at
+    the elongation with which the motion begins: their second derivatives decide.
+
+    In:
+      model: with the members, from the first place on.
+      candidates, k, s: as of `sort_members`.
+      i, left: the first member, and a bit for each that there is.
+      modes: how many modes are tried.
+      sorting: a `Sorting`, with these and what the members do at nodes.
+    In place:
+      inside (TRIED, NODES): of `_fill_masks`; a bit is added at the first node for the mode of each of these members.
+      node (NODE_ROWS, NODES): scratch.
+    """
+    works, tried = sorting.works, sorting.tried
+    for n in range(modes):
+        left &= ~inside[n, 0]
+    for lane in range(lanes() if left != 0 else 0):
+        if (left >> lane) & 1 == 0:
+            continue
+        node[ELONGATION, 0] = works[0, ELONGATION, i + lane]
+        node[RATE, 0] = works[0, RATE, i + lane]
+        now = mode_at_start(model, candidates, k, i + lane, s, node)
+        for n in range(modes):
+            if tried[n] == now:
+                inside[n, 0] |= 1 << lane
 
 
 @part
