@@ -96,11 +96,12 @@ def _priced(stated: _Stated, frames: Frames, reading: Reading) -> MemberGroup | 
     frames: where the bodies stand at the start.
     """
     fields, ends = stated.fields, stated.ends
-    for key, no in (("connect", "pairs"), ("design", False)):
-        if fields[key] == no:
-            message = f"found priced, allowed with `{key}: {str(no).lower()}` is enumerated"
-            reading.mistake(inside(ends.path, "candidates"), message)
-            return None
+    if ends.pairs:
+        reading.mistake(inside(ends.path, "candidates"), "found priced, allowed with `connect: pairs` is enumerated")
+        return None
+    if fields["design"] is False:
+        reading.mistake(inside(ends.path, "candidates"), "found priced, allowed with `design: false` is enumerated")
+        return None
     if not can_be_priced(ends, reading) or stated.laws is None or not fields.good("cost", "design"):
         return None
     size = float(np.linalg.norm(np.ptp(np.concatenate([ends.first.world, ends.second.world]), axis=0)))

@@ -165,7 +165,7 @@ def _add_followed(model, history, w, member_state, rel, u, weights, out):
     _fill_shares(history.when[o : o + stages], time, share)
     weight = np.zeros(NODES)
     if weights.shape[0] > 0:
-        fill_power(share @ weights, weight)
+        fill_power(_densities(share, weights), weight)
     changes = np.empty((u.shape[0], NODES, n_pair, freedoms(model)))
     _fill_changes(share, u, changes)
     node = np.zeros((NODE_ROWS, NODES))
@@ -256,6 +256,16 @@ def _fill_shares(when, time, share):
             share[c, j] = 0.0
             for d in range(degree + 1):
                 share[c, j] += AT_NODES[c, d] * legendre[d]
+
+
+@kernel
+def _densities(share, x):
+    """Densities at the nodes (NODES,) of numbers x (S,) at the stages; share (NODES, S): of `_fill_shares`."""
+    found = np.zeros(NODES)
+    for c in range(NODES):
+        for j in range(x.shape[0]):
+            found[c] += share[c, j] * x[j]
+    return found
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from mdstopo.compiler.jit import part
 from mdstopo.general.model.priced_candidates import NODE, NODES, POWERS
 from mdstopo.mechanics.kinematics.kinematics_interface import ALONG, ELONGATION, RATE
-from mdstopo.mechanics.laws.law_table import law, law_is_idle, law_margin, law_next, law_set
+from mdstopo.mechanics.laws.law_table import law, law_has_pieces, law_is_idle, law_margin, law_next, law_set
 
 #: the highest power of time that virtual changes within a step have, and stages from which on they have it
 HIGHEST, MANY = 3, 8
@@ -20,11 +20,14 @@ GAUSS = 0.5 * np.array(np.polynomial.legendre.leggauss(5)) + np.array([[0.5], [0
 #: what is known of a member at the nodes: the first rows of `member_works`, ELONGATION, RATE and ALONG
 NODE_ROWS = 3
 #: pieces of a step in which a member stays in a mode: the fraction at which one begins, the mode, the permanent set;
-#: how many changes are followed, and to which fraction of the step each is located
+#: how many changes are followed, as many as a table of measured forces has rows within a long step, and to which
+#: fraction of the step each is located
 PIECE = 3
 BEGIN, PIECE_MODE, PIECE_SET = range(PIECE)
-CHANGES = 4
+CHANGES = 64
 LOCATED = 2.0**-40
+#: the mode in which a curve looks for its piece at each elongation
+ANY_PIECE = 0
 #: a margin below this leaves open in which mode a member begins, and its second derivative decides (m, m/s or a part)
 CLOSE = 1e-6
 #: a mode is over where its margin is below zero by more than rounding, this part of 1 m and the member's length: right
@@ -155,18 +158,22 @@ def follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
       power (NODE_ROWS, NODES): coefficients of these, unless it stays in its mode.
       pieces (CHANGES + 1, PIECE): set.
 
-    Returns the number of the last piece.
+    Returns the number of the last piece; where there would be more, a curve is in that one as it is everywhere.
     """
     pieces[0, BEGIN] = 0.0
     pieces[0, PIECE_MODE] = mode
     pieces[0, PIECE_SET] = kept
     last = np.int64(0)
-    while last < CHANGES:
+    while True:
         begin = pieces[last, BEGIN]
         mode = np.int64(pieces[last, PIECE_MODE])
         kept = pieces[last, PIECE_SET]
         over = _first_over(code, p, curves, rest, time, node, begin, mode, kept)
         if over == NODES:
+            return last
+        if last == CHANGES:
+            if law_has_pieces(code):
+                pieces[last, PIECE_MODE] = ANY_PIECE
             return last
         if last == 0:
             fill_power(node[ELONGATION], power[ELONGATION])
@@ -187,7 +194,6 @@ def follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
         pieces[last, BEGIN] = upper
         pieces[last, PIECE_MODE] = new
         pieces[last, PIECE_SET] = kept + law_set(code, p, x, mode, new)
-    return last
 
 
 @part

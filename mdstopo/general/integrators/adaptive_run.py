@@ -8,7 +8,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import make_workspace
 from mdstopo.general.events.event_log import Crowd
-from mdstopo.general.events.events import has_switches, room_for_watched
+from mdstopo.general.events.events import has_curves, has_switches, room_for_watched
 from mdstopo.general.events.landing import landing_of
 from mdstopo.general.events.locate import NEAREST
 from mdstopo.general.model.bundles import bundle
@@ -27,8 +27,8 @@ MARGIN, LOOSE, SLACK = 0.02, 1e-5, 1.0 / 3.0
 
 #: the parts of the structures below
 RULES = (
-    "tolerance", "fixed_step", "most_steps", "stages_inside", "tangent", "s", "order", "switching", "rubbing",
-    "measures", "rounding", "graze",
+    "tolerance", "fixed_step", "most_steps", "stages_inside", "tangent", "s", "order", "switching", "curved",
+    "rubbing", "measures", "rounding", "graze",
 )  # fmt: skip
 STRAIN = ("rel0", "weight", "motion", "noise", "scale", "shortest", "shaken")
 RATES = ("brake", "braking", "held", "decay", "limited", "ended", "moving")
@@ -46,9 +46,9 @@ class Rules:
     tolerance: error that a step may have, relative. fixed_step (s): above 0 where steps have no error control.
     most_steps: how many are allowed. stages_inside: whether all stages are to lie within their steps. tangent: whether
     tangents are kept for a reverse sweep. s, order: stages and order of the method. switching: whether members have
-    modes. rubbing: whether contacts limit steps (implicit stages bear what brakes). measures: whether steps tell the
-    rate of dampers. rounding, graze (m): margins below these count as zero, as that of a member that has just switched;
-    or as no switch.
+    modes. curved: whether some have pieces of a curve. rubbing: whether contacts limit steps (implicit stages bear what
+    brakes). measures: whether steps tell the rate of dampers. rounding, graze (m): margins below these count as zero,
+    as that of a member that has just switched; or as no switch.
     """
 
     def __init__(self, *_parts: object) -> None: ...
@@ -195,6 +195,7 @@ def _rules(tag, model, tangent, settings, limits, size):
         s,
         order,
         has_switches(model, np.bool_(True)),
+        has_curves(model),
         explicit and model.contact_pair.shape[0] > 0,
         explicit and method_number(model) == 1 and not settings[2] > 0.0,
         ROUNDING * size,

@@ -17,6 +17,10 @@ from mdstopo.integrators.runge_kutta_tables import INSIDE
 from mdstopo.integrators.steps import CHATTERING, FORCES, NEEDS_ROOM, OF_STARTS, OF_SWITCHES, OK
 from mdstopo.mechanics.kinematics.kinematics_interface import relative_pose
 
+#: a step of a scene with curves that ends before this fraction is made anew: stages far behind its end take forces
+#: from cubics far beyond their pieces, which are as large as they like, and derivatives are sums over the stages
+LEAST_OF_CURVES = 0.5
+
 
 @kernel
 def end_at_switch(tag, run):
@@ -40,7 +44,8 @@ def end_at_switch(tag, run):
         reject(run, INSIDE if c < 2.0 else run.rules.s, run.wanted)
         return False
     if trial.happens:
-        if run.rules.stages_inside or sharp or not is_explicit(tag):
+        far = run.rules.curved and c < LEAST_OF_CURVES
+        if run.rules.stages_inside or sharp or far or not is_explicit(tag):
             run.work[OF_SWITCHES] += run.rules.s
             if advance_to_switch(tag, run, c, rate):
                 reject(run, run.rules.s, 0.25 * trial.h)

@@ -346,21 +346,13 @@ def fill_bound(series, bound):
 
 
 @part
-def fill_series(axes, frame, at_row, line, rows, number, w, series):
-    """Elongations (m) and rates (m/s) of all members of a part at a relative pose, as series in the places of their
-    points on the lines, and how far they may be from these.
+def _fill_middles(axes, frame, at_row, line, rows, w):
+    """What joins the middles of two lines at a relative pose, and what that becomes along the second.
 
-    Constant:
-      axes: 2 in a plane, 3 in space.
-    In:
-      frame (any, n_frame), at_row: how ends move, of `priced_candidates.PricedCandidates`, and in which row.
-      line, rows (2, 2, axes): lines of the part's second points and of the first.
-      number (PART_NUMBERS,): of the part.
-    Out:
-      series (SERIES_NUMBERS,): set.
-      w (4, axes): scratch.
+    axes, frame, at_row, line, rows: as of `fill_series`.
+    w (4, axes): out: the vector between them, its change along half the second line, and the rates of both.
 
-    Returns whether there are any: not where ends may meet.
+    Returns the distance (m).
     """
     turn = axes
     speed_at = axes + axes * axes
@@ -383,7 +375,28 @@ def fill_series(axes, frame, at_row, line, rows, number, w, series):
         w[2, d] = rate
         w[3, d] = swing
         square += at * at
-    length = math.sqrt(square)
+    return math.sqrt(square)
+
+
+@part
+def fill_series(axes, frame, at_row, line, rows, number, w, series):
+    """Elongations (m) and rates (m/s) of all members of a part at a relative pose, as series in the places of their
+    points on the lines, and how far they may be from these.
+
+    Constant:
+      axes: 2 in a plane, 3 in space.
+    In:
+      frame (any, n_frame), at_row: how ends move, of `priced_candidates.PricedCandidates`, and in which row.
+      line, rows (2, 2, axes): lines of the part's second points and of the first.
+      number (PART_NUMBERS,): of the part.
+    Out:
+      series (SERIES_NUMBERS,): set.
+      w (4, axes): scratch.
+
+    Returns whether there are any: not where ends may meet.
+    """
+    spin_at = 2 * axes + axes * axes
+    length = _fill_middles(axes, frame, at_row, line, rows, w)
     reach = number[REACH]
     shortest = length - reach
     if not shortest > 0.0:
