@@ -181,7 +181,7 @@ class Bench:
             evaluate_responses(
                 self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, settings, self.limits,
                 self.count, self.reductions, gradient, self.room, self.room_ints, self.strength,
-                np.zeros((ROWS, padded)), self.rows, self.row_counts, self.gradients, np.zeros(2, dtype=np.int64),
+                np.zeros((ROWS, padded)), self.rows, self.row_counts, self.gradients, np.zeros(3, dtype=np.int64),
                 self.work,
             )  # fmt: skip
         arrays = carve.py_func(
