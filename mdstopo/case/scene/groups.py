@@ -126,7 +126,7 @@ def _group(
     """The group.
 
     stated: what the file says of it.
-    laws: of its members.
+    laws: `stated.laws`, known to be there.
     joined: the points P and Q of its members.
     length: of each of them at the start (m).
     cost: of each of them.
@@ -155,6 +155,7 @@ def _group(
 
 
 def _cost_in_range(total: float, stated: _Stated, reading: Reading) -> bool:
+    """Whether the cost of a whole group is a number; notes where it is not. total: the sum."""
     if math.isfinite(total):
         return True
     reading.mistake(inside(stated.ends.path, "cost"), "the sum over the group is too large for a number")

@@ -56,6 +56,11 @@ class Ends(Value):
         return n_p if self.pairs else n_p * len(self.second.world)
 
     @property
+    def filtered(self) -> bool:
+        """Whether lengths are limited."""
+        return self.low > 0.0 or self.high is not None
+
+    @property
     def scale(self) -> float:
         """The largest coordinate of a point at the start (m)."""
         return float(max(np.abs(self.first.world).max(), np.abs(self.second.world).max()))
@@ -111,6 +116,7 @@ def read_ends(fields: Fields, points: dict[str, PointGrid], frames: Frames, read
 
 
 def _end(fields: Fields, key: str, points: dict[str, PointGrid], frames: Frames, reading: Reading) -> End | None:
+    """The points at one end of a group; None where they cannot be told. key: `from` or `to`."""
     end = fields[key]
     if isinstance(end, str):
         grid = points.get(end)
@@ -132,8 +138,7 @@ def pairs_of(ends: Ends, built: int, reading: Reading) -> Pairs | None:
     left = total_memory() // BYTES_PER_MEMBER - built
     if not _can_be_tried(ends, left, reading):
         return None
-    filtered = ends.low > 0.0 or ends.high is not None
-    pairs = _all_pairs(ends) if not (filtered or ends.pairs) else _filtered(ends, left, reading)
+    pairs = _all_pairs(ends) if not (ends.filtered or ends.pairs) else _filtered(ends, left, reading)
     if pairs is None:
         return None
     zero = np.flatnonzero(pairs.length <= ROUNDING * ends.scale)
@@ -171,10 +176,9 @@ def _can_be_tried(ends: Ends, left: int, reading: Reading) -> bool:
         message = f"{ends.first.text} has {n_p:,} points and {ends.second.text} {n_q:,}; pairs need equal counts"
         reading.mistake(inside(ends.path, "connect"), message)
         return False
-    filtered = ends.low > 0.0 or ends.high is not None
-    most = MOST_CANDIDATES if filtered else left
+    most = MOST_CANDIDATES if ends.filtered else left
     if ends.candidates > most:
-        what = "more than can be filtered" if filtered else "more than memory holds"
+        what = "more than can be filtered" if ends.filtered else "more than memory holds"
         message = f"{count_text(ends.candidates)} members are {what}; allowed are {count_text(most)}"
         reading.mistake(ends.path, message)
         return False

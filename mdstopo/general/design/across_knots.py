@@ -55,7 +55,8 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 )
 from mdstopo.mechanics.laws.law_table import law, law_has_pieces, law_margin, law_start
 
-#: steps of fewer stages are of methods of second order, which lose nothing by knots
+#: steps of fewer stages are of methods of second order, which lose nothing by knots; others begin with a stage at their
+#: start (Gauss does not, but takes no laws with pieces). `row_sweep.SHORT_STEP` is below this
 FEWEST_STAGES = 4
 
 
@@ -68,7 +69,7 @@ def add_across_knots(model, history, w, member_state, z, out):
       history, w: the history of steps (`StepHistory`), and the step.
       member_state (3, columns): state of the members, with the modes of the step.
     In:
-      z (R, stages or more, n): virtual displacements of the stages for each of R rows.
+      z (R, stages or more, n): virtual displacements of the stages, times the stages' weights, for each of R rows.
     Out:
       out (R, M_padded or more): derivatives by alpha^mu, to which the sums over the stages have been added.
     """
@@ -87,7 +88,8 @@ def add_changes_across_knots(model, history, w, member_state, rel, u, out):
 
     model, history, w, member_state, out: as there.
     rel (S, n_pair, POSE): relative poses at the stages.
-    u (R, S or more, n_pair, D): virtual changes of these for each row, with their signs turned.
+    u (R, S or more, n_pair, D): virtual changes of these, weighted alike, for each row, with their signs
+    turned.
     """
     if _follows_any(model, history, w, member_state):
         _add_followed(model, history, w, member_state, rel, u, np.empty(0), out)
@@ -206,6 +208,8 @@ def _fill_nodes(model, history, w, member_state, time, poses, acc):
     time (2,): start and length of the step (s).
     poses (NODES, n_pair, POSE): out. acc (n_pair, D): out, second derivatives of these at the first node.
 
+    The balance at its end is not counted as work.
+
     Returns whether there are accelerations at its end.
     """
     n = model.mass.shape[0]
@@ -294,7 +298,7 @@ def _follow(model, k, i, time, pose, acc, works, node, power, pieces):
     node (NODE_ROWS, NODES): out, ELONGATION and RATE.
     power, pieces: of `followed_member.follow`, out.
 
-    Returns the number of the last piece; 0 also for a member that has no length somewhere.
+    Returns the number of the last piece; 0 where it stays in one, or has no length at a node.
     """
     code = model.block[k, CODE]
     p = model.law[k]

@@ -20,8 +20,8 @@ GAUSS = 0.5 * np.array(np.polynomial.legendre.leggauss(5)) + np.array([[0.5], [0
 #: what is known of a member at the nodes: the first rows of `member_works`, ELONGATION, RATE and ALONG
 NODE_ROWS = 3
 #: pieces of a step in which a member stays in a mode: the fraction at which one begins, the mode, the permanent set;
-#: how many changes are followed, as many as a table of measured forces has rows within a long step, and to which
-#: fraction of the step each is located
+#: how many changes are followed at most, about the rows of a table of measured forces; to which fraction of the step
+#: each is located
 PIECE = 3
 BEGIN, PIECE_MODE, PIECE_SET = range(PIECE)
 CHANGES = 64
@@ -158,7 +158,8 @@ def follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
       power (NODE_ROWS, NODES): coefficients of these, unless it stays in its mode.
       pieces (CHANGES + 1, PIECE): set.
 
-    Returns the number of the last piece; where there would be more, a curve is in that one as it is everywhere.
+    Returns the number of the last piece, at most CHANGES. A curve that would have more looks up its piece at each
+    elongation from there on (`ANY_PIECE`); other laws stay in that mode.
     """
     pieces[0, BEGIN] = 0.0
     pieces[0, PIECE_MODE] = mode

@@ -8,7 +8,7 @@ import numpy as np
 from mdstopo.case.laws import Law
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.compiler.threads import allowed
-from mdstopo.general.design.followed_member import AT_NODES, HIGHEST, MANY
+from mdstopo.general.design.followed_member import AT_NODES, degree_of
 from mdstopo.general.driver.row_gradients import sign_of, wanted_rows
 from mdstopo.general.model.general_model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
 from mdstopo.general.model.priced_candidates import (
@@ -426,7 +426,7 @@ def _between_stages(values: FloatArray, when: FloatArray, stages: slice, begin: 
     own = values[stages]
     if length <= 0.0 or not own.any():
         return np.zeros((NODES, *own.shape[1:]))
-    degree = HIGHEST if len(own) >= MANY else min(len(own) - 1, HIGHEST - 1)
+    degree = degree_of.py_func(len(own))  # type: ignore[attr-defined]
     fraction = (when[stages] - begin) / length
     at_stages = np.polynomial.legendre.legvander(2.0 * fraction - 1.0, degree)
     found: FloatArray = np.tensordot(AT_NODES[:, : degree + 1] @ at_stages.T, own, axes=1)

@@ -21,13 +21,13 @@ from mdstopo.general.steps.step_history import (
 from mdstopo.integrators.steps import FORCES, OF_STARTS
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size, relative_pose
 
-#: so many switches within a millionth of the simulated time are chattering
+#: so many switches that follow one within this part of the simulated time are chattering
 CHATTER, TOGETHER = 400, 1e-6
 
 
 class Crowd:
-    """Switches in a row that are very close to each other, inside kernels. count: how many they are; since: when they
-    began (s)."""
+    """Switches in a row that are very close to each other, inside kernels. count: how many have followed the first one;
+    since: when that one was (s)."""
 
     def __init__(self, *_numbers: object) -> None: ...
 
@@ -36,10 +36,10 @@ bundle(Crowd, ("count", "since"))
 
 
 @kernel
-def is_chattering(crowd, t, times):
-    """Whether so many members have switched within so short a time that this would go on forever.
+def note_switch(crowd, t, times):
+    """Add a switch to a crowd; whether so many have been within so short a time that this would go on forever.
 
-    crowd: the `Crowd`, to which a switch at t (s) is added. times: the breakpoints of the run (s).
+    crowd: the `Crowd`. t: time of the switch (s). times: the breakpoints of the run (s).
     """
     span = times[times.shape[0] - 1] - times[0]
     crowd.count = crowd.count + 1 if t - crowd.since < TOGETHER * span else 0

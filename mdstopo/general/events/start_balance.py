@@ -11,19 +11,17 @@ from mdstopo.general.steps.run_start import modes_at_start
 
 
 @kernel
-def balance_at_start(
-    model, member_state, workspace, q, v, a, lam, most_knotted, graze, where
-):  # fmt: skip
-    """The modes of all members at the start of a run, none of them with a permanent set, and the balance there.
+def balance_at_start(model, member_state, workspace, q, v, a, lam, most_knotted, graze, where):
+    """The modes and permanent sets of all members at the start of a run, and the balance there.
 
     Constant:
       model: the compiled scene.
       most_knotted: as of `modes_at_start`.
       graze: sets that differ by less than this count as one (m).
     In:
-      q (n_q,), v (n,): the start.
+      q (n_q,), v (n,): the start, with driven parts in place.
     Out:
-      member_state (3, columns): modes and permanent sets of the members; their scales are there.
+      member_state (3, columns): modes and permanent sets of the members; their scales are read.
       where (3,): all -1 but where[2], which becomes a member whose set may be either of two.
       workspace: workspace of the balance, with its tangents (`accelerations.Workspace`).
       a (n,), lam (n_row,): accelerations and multipliers.

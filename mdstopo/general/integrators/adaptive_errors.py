@@ -4,7 +4,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.singular_poses import CLOSE, NEAR, crosses, error_along, least_singular_value
-from mdstopo.general.integrators.adaptive_run import reject
+from mdstopo.general.integrators.adaptive_run import count_rejected, reject
 from mdstopo.general.integrators.braking import friction_error
 from mdstopo.general.steps.first_step import motion_scale
 from mdstopo.general.steps.method_interface import step_error
@@ -49,9 +49,8 @@ def judge_step(tag, run):
     times = step.model.times
     shortest = 1e-9 * (times[times.shape[0] - 1] - times[0])
     if poses.at_end < NEAR * poses.sigma and not run.trial.lands and h > shortest:
-        reaches = poses.reaches
-        reject(run, s, 0.6 * h)
-        poses.reaches = reaches  # the pose is still ahead
+        run.wanted = 0.6 * h  # and it still reaches across the pose
+        count_rejected(run, s)
         return False, OK
     return True, OK
 

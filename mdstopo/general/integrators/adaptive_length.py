@@ -22,7 +22,7 @@ def plan_step(run):
     end = times[run.segment + 1]
     last = times[times.shape[0] - 1]
     run.where[0] = -1
-    if _is_hopeless(run, last - run.t) or run.count >= run.rules.most_steps:
+    if _limit_by_stability(run, last - run.t) or run.count >= run.rules.most_steps:
         return STEP_LIMIT
     pieces = np.ceil((end - run.t) / run.wanted - 1e-9)
     h = (end - run.t) / max(pieces, 1.0)
@@ -44,7 +44,7 @@ def plan_step(run):
 
 
 @kernel
-def _is_hopeless(run, left):
+def _limit_by_stability(run, left):
     """Keep the wanted step as short as stability asks for; whether far too many would be needed.
 
     left: until the end of the run (s).

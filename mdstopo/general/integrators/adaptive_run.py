@@ -46,7 +46,7 @@ class Rules:
     tolerance: error that a step may have, relative. fixed_step (s): above 0 where steps have no error control.
     most_steps: how many are allowed. stages_inside: whether all stages are to lie within their steps. tangent: whether
     tangents are kept for a reverse sweep. s, order: stages and order of the method. switching: whether members have
-    modes. curved: whether some have pieces of a curve. rubbing: whether contacts limit steps (implicit stages bear what
+    modes. curved: whether any law has pieces. rubbing: whether contacts limit steps (implicit stages bear what
     brakes). measures: whether steps tell the rate of dampers. rounding, graze (m): margins below these count as zero,
     as that of a member that has just switched; or as no switch.
     """
@@ -58,8 +58,8 @@ class Strain:
     """How far bodies have moved against each other, by which errors are weighed; arrays have an entry a pair of bodies.
 
     rel0 (n_pair, POSE): poses at the start of the run. weight (n,): of errors of coordinates. motion, noise (m): by how
-    much each pair has been strained, and what rounding leaves of that. scale: the weight of its pose. shortest (m): of
-    its members. shaken: what rounding leaves of forces.
+    much each pair has been strained, and what rounding leaves of that. scale: the weight of its pose. shortest (m): at
+    most the length of its shortest member at the start. shaken: what rounding leaves of forces.
     """
 
     def __init__(self, *_parts: object) -> None: ...
@@ -105,7 +105,8 @@ class AdaptiveRun:
     rules, strain, rates, poses, roots, trial: a `Rules`, `Strain`, `Rates`, `Poses`, `Roots`, `Trial`.
     history, work, where: as of `adaptive_steps.run_adaptive`.
     lam (n_row,), push (2, n_row): multipliers of the joints at the last stage, and of the projection.
-    end_q (n_q,), end_v (n,): the end of the step. a0 (n,): accelerations at the start.
+    end_q (n_q,), end_v (n,): the end of the step. a0 (n,): accelerations at the start, and behind
+    switches and breakpoints.
     rel, before (n_pair, POSE): poses at the end of the step, and at its start.
     segment: number of the stretch of time between two breakpoints.
     t (s): time reached. wanted, longest (s): lengths of the next step, and of the longest so far.
@@ -232,5 +233,11 @@ def reject(run, stages, wanted):
     """Take the step back that is being made, after so many stages; wanted: length of the one in its place (s)."""
     run.wanted = wanted
     run.poses.reaches = np.bool_(False)
+    count_rejected(run, stages)
+
+
+@kernel
+def count_rejected(run, stages):
+    """Count a step that is taken back after so many stages."""
     run.work[REJECTED] += 1
     run.work[OF_REJECTED] += stages

@@ -2,9 +2,10 @@
 
 The stages, and what estimates a step's error, are those of the method that is chosen by its tag (`method_interface`).
 The end of a step is moved onto the joints (`projection`), by no more than the step's error, so the order stays. A step
-that a switching member's margin does not survive is shortened until it ends at the event. Where slopes of a force begin
-or end with a root, as those of x^1.5, a step is of low order for derivatives: there steps become shorter and longer by
-shares of the time to and from the event, and the last one is made anew, so that no stage lies behind the root.
+that a switching member's margin does not survive ends at the event, on its own polynomial, or is made anew up to there.
+Where slopes of a force begin or end with a root, as those of x^1.5, a step is of low order for derivatives: there steps
+become shorter and longer by shares of the time to and from the event, and the last one is made anew, so that no stage
+lies behind the root.
 
 A step is planned (`adaptive_length`), made (`runge_kutta_step`), judged (`adaptive_errors`), ended where a member
 switches (`adaptive_switch`), and kept; what one step hands to the next is an `AdaptiveRun`.
@@ -58,7 +59,8 @@ def run_adaptive(
       model: the compiled scene.
       tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
       settings (5,): the tolerance; -; a fixed step (s; above 0: no error control); -; not 0 where stages are to lie
-        within their steps, as for integrals over time: then steps that end at a switch are made anew, and shorter.
+        within their steps, as for integrals over time: then all steps that end at a switch are made anew, and shorter;
+        else only those near a root, early ones of scenes with curves, and implicit ones.
       limits (6,): steps allowed, then sizes of the history of steps (`carve_history`).
     In:
       alpha (N,): the design.

@@ -5,7 +5,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import solve_accelerations
 from mdstopo.general.dynamics.singular_poses import least_singular_value
-from mdstopo.general.events.event_log import is_chattering, log_switches
+from mdstopo.general.events.event_log import log_switches, note_switch
 from mdstopo.general.events.events import is_doubtful, smallest_margin, watch_near
 from mdstopo.general.events.landing import CORRECTIONS, first_event
 from mdstopo.general.events.locate import AIM, NEAR, RESOLUTION, is_sharp, time_to_sharp
@@ -40,14 +40,14 @@ def end_at_switch(tag, run):
     if trial.happens and not run.rules.fixed_step > 0.0:
         relative_pose(step.model, step.at_q, step.at_v, step.rel)
         sharp = is_sharp(step.model, run.t + c * trial.h, step.member_state, step.rel, trial.who)
-    if _is_ahead(run, c, sharp):
+    if _leads_to_root(run, c, sharp):
         reject(run, INSIDE if c < 2.0 else run.rules.s, run.wanted)
         return False
     if trial.happens:
         far = run.rules.curved and c < LEAST_OF_CURVES
         if run.rules.stages_inside or sharp or far or not is_explicit(tag):
             run.work[OF_SWITCHES] += run.rules.s
-            if advance_to_switch(tag, run, c, rate):
+            if _advance_to_switch(tag, run, c, rate):
                 reject(run, run.rules.s, 0.25 * trial.h)
                 return False
         else:
@@ -62,7 +62,7 @@ def end_at_switch(tag, run):
 @kernel
 def _first_switch(tag, run):
     """The first switch in the step: at which fraction, 2 where there is none; the rate of its margin there; and whether
-    a stage that it takes is not found. `run.trial.who` has the smallest margin."""
+    a stage that it takes has failed. `run.trial.who` has the smallest margin."""
     step, rules, trial, h = run.step, run.rules, run.trial, run.trial.h
     relative_pose(step.model, step.q0, step.v0, run.before)
     watch_near(step.model, run.segment, run.t, step.member_state, run.before, run.rel, h, step.watched)
@@ -89,11 +89,11 @@ def _first_switch(tag, run):
 
 
 @kernel
-def _is_ahead(run, c, sharp):
-    """Whether a switch at which slopes begin with a root is so far ahead that shorter steps have to lead there.
+def _leads_to_root(run, c, sharp):
+    """Whether a switch at which slopes begin with a root is so far ahead that shorter steps have to lead there; then it
+    is noted in `run.roots`.
 
-    c: fraction of the step at which a member switches, above 1: none does. sharp: whether slopes begin with a root
-    there.
+    c: fraction of the step at which a member switches, 2: none does. sharp: whether slopes begin with a root there.
     """
     step, trial, roots = run.step, run.trial, run.roots
     until = c * trial.h if sharp else 0.0
@@ -123,14 +123,14 @@ def _end_inside(run, c):
 
 
 @kernel
-def advance_to_switch(tag, run, c, rate):
+def _advance_to_switch(tag, run, c, rate):
     """Make the step anew so that it ends where a member switches, for the sake of what needs all stages within a step.
 
     tag: the method of integration (`method_interface`).
     run: the run (`AdaptiveRun`); `trial` is written: the length, and whether a margin is used up at its end.
     c, rate: the fraction of the step that is found on its polynomial, and the rate of the margin there (`first_event`).
 
-    Returns whether a stage is not found.
+    Returns whether it has failed: a stage is not found, or joints are singular or do not fit.
     """
     step, trial, rounding, h = run.step, run.trial, run.rules.rounding, run.trial.h
     trial.h = c * h
@@ -187,7 +187,7 @@ def go_on_behind(run):
     else:
         run.wanted = max(run.wanted, roots.usual)
     roots.usual = 0.0
-    if is_chattering(run.crowd, run.t, model.times):
+    if note_switch(run.crowd, run.t, model.times):
         run.where[0] = run.trial.who
         return CHATTERING
     return OK

@@ -17,7 +17,7 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.dynamics.accelerations import solve_accelerations
 from mdstopo.general.dynamics.members import may_meet, meeting, scale_general, shortest_at_start
-from mdstopo.general.events.event_log import is_chattering, log_at_breakpoint, log_switches
+from mdstopo.general.events.event_log import log_at_breakpoint, log_switches, note_switch
 from mdstopo.general.events.events import watch_all
 from mdstopo.general.events.start_balance import balance_at_start
 from mdstopo.general.integrators.generalized_alpha_run import make_run, make_step
@@ -246,7 +246,7 @@ def _go_on_behind(run):
     pace.events = max(events, 0)
     if events < 0:
         return NEEDS_ROOM
-    if is_chattering(run.crowd, pace.t, model.times):
+    if note_switch(run.crowd, pace.t, model.times):
         run.where[0] = run.trial.who
         return CHATTERING
     _divide(run)

@@ -12,7 +12,7 @@ from mdstopo.general.dynamics.accelerations import make_workspace
 from mdstopo.general.events.event_log import Crowd
 from mdstopo.general.events.events import has_switches, room_for_watched
 from mdstopo.general.events.locate import CUTS
-from mdstopo.general.integrators.generalized_alpha_step import advance, make_step_room
+from mdstopo.general.integrators.generalized_alpha_step import VELOCITY, advance, make_step_room
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.steps.run_start import ROUNDING, scene_size
 from mdstopo.general.steps.step_trial import Trial
@@ -34,9 +34,9 @@ ROOM = (
 class FixedRules:
     """What holds for all steps of a run.
 
-    radius, newton_tolerance, size: as of `generalized_alpha_step.advance`. step (s): the length that is asked for, or,
-    where negative, so many radians of the fastest vibration at the start. rounding, graze: margins up to these count as
-    zero, or touch zero only (m). switching: whether members have modes.
+    radius, newton_tolerance, size: as of `generalized_alpha_step.advance`. step (s): their length; until the run has
+    begun it may be negative: so many radians of the fastest vibration at the start. rounding, graze: margins up to
+    these count as zero, or touch zero only (m). switching: whether members have modes.
     """
 
     def __init__(self, *_numbers: Any) -> None: ...
@@ -59,9 +59,10 @@ class FixedRun:
     model: the compiled scene. rules, pace, trial, crowd: a `FixedRules`, `Pace`, `Trial`, `event_log.Crowd`.
     workspace, history, q, state, end_q, ends, push, guess, extent, rel0, step_room, work: as of
     `generalized_alpha_step.advance`. member_state (3, columns): scale, mode and permanent set. watched: as of
-    `events.smallest_margin`. a0 (n,), lam (n_row,): accelerations and multipliers at the start, and at switches. rel,
-    before (n_pair, POSE): poses at the end of the step, and at its start. shortest (n_pair,): members of each pair (m).
-    switch_room: a `SwitchRoom`. where (3,): as of `generalized_alpha.simulate`.
+    `events.smallest_margin`. a0 (n,), lam (n_row,): accelerations and multipliers at the start, and behind switches and
+    breakpoints. rel, before (n_pair, POSE): poses at the end of the step, and at its start or that of a piece of it.
+    shortest (n_pair,): at most the length of the shortest member of each pair at the start (m). switch_room: a
+    `SwitchRoom`. where (3,): as of `generalized_alpha.simulate`.
     """
 
     def __init__(self, *_parts: Any) -> None: ...
@@ -113,7 +114,7 @@ def make_run(model, radius, settings, history, member_state, where, work):
     t = model.times[0]
     size = scene_size(model)
     state = np.zeros((3, n))
-    state[0] = model.v0
+    state[VELOCITY] = model.v0
     return FixedRun(
         model,
         FixedRules(

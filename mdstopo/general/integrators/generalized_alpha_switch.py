@@ -29,7 +29,7 @@ from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 
 
 @kernel
-def first_piece(run, room, segment, t, h, starting, end_q, ends):
+def _first_piece(run, room, segment, t, h, starting, end_q, ends):
     """The first piece of a step at whose end a margin is used up.
 
     In:
@@ -95,16 +95,16 @@ def first_piece(run, room, segment, t, h, starting, end_q, ends):
 
 
 @kernel
-def close_in(run, room, segment, t, h, starting, low, high, top, margin, who):
+def _close_in(run, room, segment, t, h, starting, low, high, top, margin, who):
     """The length of a step that ends where a member switches.
 
     In:
       run: a `FixedRun`.
       segment, t, h, starting: as of `make_step`.
-      low, high, top: the piece in which it switches, as of `first_piece`.
+      low, high, top: the piece in which it switches, as of `_first_piece`.
       margin, who: the margin at its end, and whose it is.
     In and out:
-      room: the `SwitchRoom` of `first_piece`.
+      room: the `SwitchRoom` of `_first_piece`.
 
     Returns a code, with the unknown at which joints are singular; the length (s), and the member that switches.
     """
@@ -154,13 +154,13 @@ def end_at_switch(run, starting):
     Returns a code, with the unknown at which joints are singular.
     """
     trial, segment, t = run.trial, run.pace.segment, run.pace.t
-    code, singular, margin, who, low, high, top = first_piece(
+    code, singular, margin, who, low, high, top = _first_piece(
         run, run.switch_room, segment, t, trial.h, starting, run.end_q, run.ends
     )
     trial.happens = margin < -run.rules.rounding
     trial.who = who
     if trial.happens and code == OK:
-        code, singular, length, who = close_in(
+        code, singular, length, who = _close_in(
             run, run.switch_room, segment, t, trial.h, starting, low, high, top, margin, who
         )
         trial.h = length
