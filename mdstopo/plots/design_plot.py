@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.plots.legend import told
+from mdstopo.plots.legend import name_in_legend
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import HEIGHT, MOST_NAMED, colour, new_figure
 
@@ -27,7 +27,7 @@ def draw(module: Any, source: Source) -> Any:
         own = colour(k)
         if len(alpha) <= STEMS:
             axis.vlines(places, 0.0, alpha[part], color=own, linewidth=0.8)
-        axis.plot(places, alpha[part], ".", color=own, markersize=2, label=told("members", name))
+        axis.plot(places, alpha[part], ".", color=own, markersize=2, label=name_in_legend("members", name))
     axis.set_xlabel("member")
     axis.set_ylabel("alpha")
     axis.set_ylim(bottom=min(0.0, float(alpha.min(initial=0.0))))

@@ -7,7 +7,7 @@ import numpy as np
 from mdstopo.case.model import GROUND, Case
 from mdstopo.plots.body_shapes import Shape, followed, planar_shapes
 from mdstopo.plots.glyphs import glyphs
-from mdstopo.plots.legend import told
+from mdstopo.plots.legend import name_in_legend
 from mdstopo.plots.member_lines import draw_members
 from mdstopo.plots.scenery import edge_at, own_points
 from mdstopo.plots.source import Floats, Source
@@ -80,7 +80,7 @@ def draw_bodies(axis: Any, case: Case, q: Floats, faint: float = 1.0) -> None:
             places = points_at(case, name, np.concatenate(points), q[None])[0]
             axis.plot(*places.T, ".", color=own, markersize=2, alpha=faint, zorder=2.6)
         if name != GROUND:
-            label = told("body", name, case) if faint == 1.0 else None
+            label = name_in_legend("body", name, case) if faint == 1.0 else None
             axis.plot(q[3 * k], q[3 * k + 1], "+", color=own, markersize=6, label=label, alpha=faint, zorder=2.6)
 
 

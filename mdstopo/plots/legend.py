@@ -26,7 +26,7 @@ LONGEST, BEGINNING = 50, 30
 WORDS = frozenset({"contact", "slack", *(glyph.words for glyph in glyphs().values())})
 
 
-def told(kind: str, name: str, case: Case | None = None) -> str:
+def name_in_legend(kind: str, name: str, case: Case | None = None) -> str:
     """What a legend calls a body or a group of members: its name, with the word `kind` before it where the name alone
     would be left out by matplotlib (`_a`) or is that of something else in the legend of a case (`load`).
 
@@ -47,8 +47,8 @@ def _words(case: Case) -> set[str]:
 def legend_names(case: Case, load_case: str | None = None) -> list[str]:
     """What a layout's legend may name, about in its order."""
     groups = dict.fromkeys(families(case))
-    names = [*["contact"] * bool(case.contacts), *(told("body", body.name, case) for body in case.bodies)]
-    names += [f"{told('members', group, case)}*" for group in groups] if len(groups) <= MOST_NAMED else []
+    names = [*["contact"] * bool(case.contacts), *(name_in_legend("body", body.name, case) for body in case.bodies)]
+    names += [f"{name_in_legend('members', group, case)}*" for group in groups] if len(groups) <= MOST_NAMED else []
     names += ["slack"] * any(belt_lengths(case, group) is not None for group in case.members)
     return [*names, *{glyphs()[each.kind].words: None for each in symbols(case, load_case)}]
 

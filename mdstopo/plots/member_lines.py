@@ -7,7 +7,7 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.plots.beside import FREE, side_places, sideways
-from mdstopo.plots.legend import told
+from mdstopo.plots.legend import name_in_legend
 from mdstopo.plots.slack import THIN, member_lines
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import MOST_NAMED, colour, ink
@@ -55,7 +55,9 @@ def draw_members(axis: Any, source: Source, q: Floats, seen: Callable[[Floats], 
     chosen_from = {each for group, each in zip(case.members, named, strict=True) if group.design}
     for family in order if len(order) <= MOST_NAMED else ():
         star = "" if family in chosen_from or not chosen_from else "*"
-        axis.plot([], [], "-", color=colour(order.index(family)), label=f"{told('members', family, case)}{star}")
+        axis.plot(
+            [], [], "-", color=colour(order.index(family)), label=f"{name_in_legend('members', family, case)}{star}"
+        )
     if any_slack:
         axis.plot([], [], color=ink("middle"), linewidth=0.8, linestyle=HANGING, label="slack")
 

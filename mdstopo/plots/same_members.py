@@ -31,6 +31,7 @@ def same_members(first: Case, second: Case) -> list[tuple[int, int]]:
     size = SAME * max(*(_size(case) for case in (first, second)), 1e-300)
     both = [_members(case, size) for case in (first, second)]
     known = [{name for member in own for name in (member.group, family(member.group))} for own in both]
+    common = known[0] & known[1]
 
     def whole(member: _Member) -> str:
         return member.group
@@ -39,7 +40,6 @@ def same_members(first: Case, second: Case) -> list[tuple[int, int]]:
         return family(member.group)
 
     def unknown(member: _Member) -> str | None:
-        common = known[0] & known[1]
         return None if member.group in common or family(member.group) in common else ""
 
     found: dict[int, int] = {}

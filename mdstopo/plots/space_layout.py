@@ -7,7 +7,7 @@ import numpy as np
 
 from mdstopo.case.model import GROUND
 from mdstopo.plots.cloud import scene_cloud
-from mdstopo.plots.legend import SETTING, columns_of, height_of, legend_handles, legend_names, told
+from mdstopo.plots.legend import SETTING, columns_of, height_of, legend_handles, legend_names, name_in_legend
 from mdstopo.plots.member_lines import draw_members, legend_title
 from mdstopo.plots.panels import ABOVE, BELOW, LEFT
 from mdstopo.plots.scenery import Floats, hull
@@ -166,7 +166,9 @@ def draw_scene(axis: Any, source: Source, view: View, q: Floats, solids: dict[st
         if points:
             axis.plot(*view.seen(points_at(case, name, np.concatenate(points), state)[0]).T, ".", color=own, ms=2)
         if name != GROUND:
-            axis.plot(*view.seen(q[7 * k : 7 * k + 3]), "+", color=own, markersize=6, label=told("body", name, case))
+            axis.plot(
+                *view.seen(q[7 * k : 7 * k + 3]), "+", color=own, markersize=6, label=name_in_legend("body", name, case)
+            )
 
 
 def _outline(axis: Any, view: View, corners: Floats, shape: Solid, own: str) -> None:

@@ -25,30 +25,31 @@ STATES, MANY = 400, 20_000
 class Thickness:
     """How thick members are drawn. shares: of each group (M,), from 0 to 1, relative to the largest.
 
-    shown: what they show, empty where nothing. largest: how much a share of 1 is. told: that number as it is told, in a
+    quantity: what they show, empty where nothing. largest: how much a share of 1 is. value: of the quantity there, in a
     unit: alpha itself, where shares are of its range.
     """
 
     shares: tuple[Floats, ...]
-    shown: str
+    quantity: str
     largest: float = 0.0
-    told: float = 0.0
+    value: float = 0.0
     unit: str = ""
 
     @property
     def what(self) -> str:
         """What they show, in words; factors of laws have no number of one unit."""
-        return self.shown if self.shown in ("", "size") else f"{self.shown}, up to {self.told:.3g}{self.unit}"
+        no_number = self.quantity in ("", "size")
+        return self.quantity if no_number else f"{self.quantity}, up to {self.value:.3g}{self.unit}"
 
 
 def alike(first: Source, second: Source) -> tuple[Thickness, Thickness]:
     """Of the members of two results, relative to the largest of both where they show the same."""
     one, other = thickness(first), thickness(second)
-    if one.shown != other.shown:
+    if one.quantity != other.quantity:
         return one, other
-    largest, told = max(one.largest, other.largest), max(one.told, other.told)
+    largest, value = max(one.largest, other.largest), max(one.value, other.value)
     one, other = thickness(first, largest=largest), thickness(second, largest=largest)
-    return replace(one, told=told), replace(other, told=told)
+    return replace(one, value=value), replace(other, value=value)
 
 
 def thickness(source: Source, alpha: Floats | None = None, largest: float = 0.0) -> Thickness:
@@ -69,7 +70,7 @@ def thickness(source: Source, alpha: Floats | None = None, largest: float = 0.0)
     ranged = [share for share, varies in zip(shares, varied, strict=True) if varies and share is not None]
     top = max((float(share.max(initial=0.0)) for share in ranged), default=0.0)
     most = largest or top or 1.0
-    told = max(
+    value = max(
         float(design[slices[group.name]][share >= top].max(initial=0.0))
         for group, share, varies in zip(case.members, shares, varied, strict=True)
         if varies and share is not None
@@ -80,7 +81,7 @@ def thickness(source: Source, alpha: Floats | None = None, largest: float = 0.0)
             found.append(share / most)
         else:
             found.append(np.full(len(group), PLAIN) if share is None else share)
-    return Thickness(tuple(found), "alpha", most, told)
+    return Thickness(tuple(found), "alpha", most, value)
 
 
 def _of_final(source: Source, design: Floats, largest: float) -> Thickness:

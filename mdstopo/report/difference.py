@@ -216,8 +216,8 @@ def _members(source: Source) -> dict[int, _Member]:
         for i, alpha in enumerate(part.tolist()):
             share = (alpha - group.lower) / width if width > 0.0 else 1.0
             ends = (
-                _told(group.body_from, group.from_world[group.from_index[i]]),
-                _told(group.body_to, group.to_world[group.to_index[i]]),
+                _end(group.body_from, group.from_world[group.from_index[i]]),
+                _end(group.body_to, group.to_world[group.to_index[i]]),
             )
             name = group.name if len(group) == 1 else f"{group.name} {i}"
             found[first + i] = _Member(alpha, share, name, " to ".join(ends))
@@ -225,5 +225,5 @@ def _members(source: Source) -> dict[int, _Member]:
     return found
 
 
-def _told(body: str, place: Floats) -> str:
+def _end(body: str, place: Floats) -> str:
     return f"{body} ({', '.join(f'{value + 0.0:.4g}' for value in place.tolist())})"

@@ -31,6 +31,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     keep_apart,
     member_motion,
     member_sums,
+    relative_pose,
     second_rate,
     spring_sums,
     spring_sums_at_poses,
@@ -184,6 +185,33 @@ def may_meet(shortest, motion):
     for p in range(motion.shape[0]):
         may = may or not shortest[p] > 1.001 * motion[p]
     return may
+
+
+@kernel
+def note_motion(model, segment, t, member_state, q, v, rel, rel0, shortest, motion, before, where):
+    """Note how far bodies have moved by the end of a step, and a member whose ends may have met in it.
+
+    Constant:
+      model: the compiled scene.
+      rel0 (n_pair, POSE): relative poses at the start of the run.
+      shortest (n_pair,): of `shortest_at_start` (m).
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time at the start of the step (s).
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      q (n_q,), v (n,): the start of the step.
+      rel (n_pair, POSE): relative poses at its end.
+    In place:
+      motion (n_pair,): how far each pair has been strained (m).
+      where (3,): where[1] becomes the member, if there is none yet.
+    Out:
+      before (n_pair, POSE): relative poses at the start of the step, where these are looked at.
+    """
+    for p in range(motion.shape[0]):
+        motion[p] = max(motion[p], deflection(model, rel, rel0, p))
+    if where[1] < 0 and may_meet(shortest, motion):
+        relative_pose(model, q, v, before)
+        where[1] = meeting(model, segment, t, member_state, before, rel)
 
 
 @kernel

@@ -22,30 +22,30 @@ from mdstopo.integrators.steps import FORCES, OF_STARTS
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size, relative_pose
 
 #: so many switches that follow one within this part of the simulated time are chattering
-CHATTER, TOGETHER = 400, 1e-6
+MOST_TOGETHER, TOGETHER = 400, 1e-6
 
 
-class Crowd:
+class Chatter:
     """Switches in a row that are very close to each other, inside kernels. count: how many have followed the first one;
     since: when that one was (s)."""
 
     def __init__(self, *_numbers: object) -> None: ...
 
 
-bundle(Crowd, ("count", "since"))
+bundle(Chatter, ("count", "since"))
 
 
 @kernel
-def note_switch(crowd, t, times):
-    """Add a switch to a crowd; whether so many have been within so short a time that this would go on forever.
+def note_switch(chatter, t, times):
+    """Count a switch; whether so many have been within so short a time that this would go on forever.
 
-    crowd: the `Crowd`. t: time of the switch (s). times: the breakpoints of the run (s).
+    chatter: the `Chatter`. t: time of the switch (s). times: the breakpoints of the run (s).
     """
     span = times[times.shape[0] - 1] - times[0]
-    crowd.count = crowd.count + 1 if t - crowd.since < TOGETHER * span else 0
-    if crowd.count == 0:
-        crowd.since = t
-    return crowd.count > CHATTER
+    chatter.count = chatter.count + 1 if t - chatter.since < TOGETHER * span else 0
+    if chatter.count == 0:
+        chatter.since = t
+    return chatter.count > MOST_TOGETHER
 
 
 @kernel

@@ -68,15 +68,6 @@ def has_switches(model, knots):
 
 
 @kernel
-def has_curves(model):
-    """Whether any member's law is a curve of pieces."""
-    for k in range(model.block.shape[0]):
-        if model.block[k, CODE] != INERTER and law_has_pieces(model.block[k, CODE]):
-            return True
-    return False
-
-
-@kernel
 def room_for_watched(model):
     """An array for a list of members and contacts: their number, then their places (`watch_all`, `watch_near`)."""
     return np.zeros(1 + model.member.shape[1] + model.contact_pair.shape[0], np.int64)

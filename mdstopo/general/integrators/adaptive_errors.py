@@ -46,9 +46,7 @@ def judge_step(tag, run):
     if error > run.rules.tolerance or turned > 1.1 * TURN:
         reject(run, s, run.wanted)
         return False, OK
-    times = step.model.times
-    shortest = 1e-9 * (times[times.shape[0] - 1] - times[0])
-    if poses.at_end < NEAR * poses.sigma and not run.trial.lands and h > shortest:
+    if poses.at_end < NEAR * poses.sigma and not run.trial.lands and h > 1e-9 * run.rules.span:
         run.wanted = 0.6 * h  # and it still reaches across the pose
         count_rejected(run, s)
         return False, OK
@@ -71,29 +69,20 @@ def _learn_decay(run):
 @kernel
 def _error(tag, run):
     """The error of the step that has been made, relative to the motion."""
-    step, strain, poses, h, s = run.step, run.strain, run.poses, run.trial.h, run.rules.s
+    step, scales, poses, h, s = run.step, run.scales, run.poses, run.trial.h, run.rules.s
     model, weights = step.model, step.table[2]
-    motion_scale(
-        model,
-        run.end_q,
-        run.rel,
-        strain.rel0,
-        strain.motion,
-        strain.noise,
-        run.rules.tolerance,
-        strain.scale,
-    )
-    motion_weights(model, run.rel, strain.scale, strain.weight)
+    motion_scale(model, run.end_q, run.rel, scales.rel0, scales.motion, scales.noise, run.rules.tolerance, scales.scale)
+    motion_weights(model, run.rel, scales.scale, scales.weight)
     # near a singular pose errors of velocities do not count as if they lasted: joints determine velocities there, and
     # the step has to reach across the pose
     lasting = run.longest if poses.sigma >= CLOSE * poses.largest else 0.0
-    error = step_error(tag, weights, s, h, lasting, step.a, strain.weight)
+    error = step_error(tag, weights, s, h, lasting, step.a, scales.weight)
     if crosses(h, poses.way):
-        error = error_along(model, step.workspace, weights, s, h, step.a, strain.weight, error, poses.at_end)
+        error = error_along(model, step.workspace, weights, s, h, step.a, scales.weight, error, poses.at_end)
     if run.rules.rubbing:
         grip = friction_error(
-            model, step.member_state, weights, s, h, step.q0, step.v0, run.end_q, run.end_v, step.a, strain.noise,
-            strain.shaken, run.rules.tolerance,
+            model, step.member_state, weights, s, h, step.q0, step.v0, run.end_q, run.end_v, step.a, scales.noise,
+            scales.shaken, run.rules.tolerance,
         )  # fmt: skip
         if grip > error or not np.isfinite(grip):
             error = grip

@@ -36,7 +36,7 @@ def plan_step(run):
         if shorter < min(h, end - run.t):
             h = shorter
             lands = False
-    if not h > 1e-14 * max(abs(run.t), abs(end)) or h < 1e-15 * (last - times[0]):
+    if not h > 1e-14 * max(abs(run.t), abs(end)) or h < 1e-15 * run.rules.span:
         return STEP_TOO_SMALL
     run.trial.h = h
     run.trial.lands = np.bool_(lands)

@@ -7,8 +7,8 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import make_workspace
-from mdstopo.general.events.event_log import Crowd
-from mdstopo.general.events.events import has_curves, has_switches, room_for_watched
+from mdstopo.general.events.event_log import Chatter
+from mdstopo.general.events.events import has_switches, room_for_watched
 from mdstopo.general.events.landing import landing_of
 from mdstopo.general.events.locate import NEAREST
 from mdstopo.general.model.bundles import bundle
@@ -28,15 +28,15 @@ MARGIN, LOOSE, SLACK = 0.02, 1e-5, 1.0 / 3.0
 #: the parts of the structures below
 RULES = (
     "tolerance", "fixed_step", "most_steps", "stages_inside", "tangent", "s", "order", "switching", "curved",
-    "rubbing", "measures", "rounding", "graze",
+    "rubbing", "measures", "rounding", "graze", "span",
 )  # fmt: skip
-STRAIN = ("rel0", "weight", "motion", "noise", "scale", "shortest", "shaken")
+SCALES = ("rel0", "weight", "motion", "noise", "scale", "shortest", "shaken")
 RATES = ("brake", "braking", "held", "decay", "limited", "ended", "moving")
 POSES = ("sigma", "at_end", "largest", "way", "reaches")
 ROOTS = ("ahead", "whose", "usual", "since", "nearest")
 FIELDS = (
-    "step", "rules", "strain", "rates", "poses", "roots", "trial", "history", "work", "where", "lam", "push", "end_q",
-    "end_v", "a0", "rel", "before", "segment", "t", "wanted", "longest", "count", "stages", "events", "crowd",
+    "step", "rules", "scales", "rates", "poses", "roots", "trial", "history", "work", "where", "lam", "push", "end_q",
+    "end_v", "a0", "rel", "before", "segment", "t", "wanted", "longest", "count", "stages", "events", "chatter",
 )  # fmt: skip
 
 
@@ -46,15 +46,15 @@ class Rules:
     tolerance: error that a step may have, relative. fixed_step (s): above 0 where steps have no error control.
     most_steps: how many are allowed. stages_inside: whether all stages are to lie within their steps. tangent: whether
     tangents are kept for a reverse sweep. s, order: stages and order of the method. switching: whether members have
-    modes. curved: whether any law has pieces. rubbing: whether contacts limit steps (implicit stages bear what
-    brakes). measures: whether steps tell the rate of dampers. rounding, graze (m): margins below these count as zero,
-    as that of a member that has just switched; or as no switch.
+    modes. curved: whether some have curves, found at the start. rubbing: whether contacts limit steps (implicit stages
+    bear what brakes). measures: whether steps tell the rate of dampers. rounding, graze (m): margins below these count
+    as zero, as that of a member that has just switched; or as no switch. span (s): how long the motion is.
     """
 
     def __init__(self, *_parts: object) -> None: ...
 
 
-class Strain:
+class Scales:
     """How far bodies have moved against each other, by which errors are weighed; arrays have an entry a pair of bodies.
 
     rel0 (n_pair, POSE): poses at the start of the run. weight (n,): of errors of coordinates. motion, noise (m): by how
@@ -102,7 +102,7 @@ class AdaptiveRun:
     """A run of adaptive steps, inside kernels.
 
     step: scene, members, state at the start of the step, its stages, workspace (`landing.Landing`).
-    rules, strain, rates, poses, roots, trial: a `Rules`, `Strain`, `Rates`, `Poses`, `Roots`, `Trial`.
+    rules, scales, rates, poses, roots, trial: a `Rules`, `Scales`, `Rates`, `Poses`, `Roots`, `Trial`.
     history, work, where: as of `adaptive_steps.run_adaptive`.
     lam (n_row,), push (2, n_row): multipliers of the joints at the last stage, and of the projection.
     end_q (n_q,), end_v (n,): the end of the step. a0 (n,): accelerations at the start, and behind
@@ -111,14 +111,14 @@ class AdaptiveRun:
     segment: number of the stretch of time between two breakpoints.
     t (s): time reached. wanted, longest (s): lengths of the next step, and of the longest so far.
     count, stages, events: how many there are.
-    crowd: an `event_log.Crowd`.
+    chatter: an `event_log.Chatter`.
     """
 
     def __init__(self, *_parts: object) -> None: ...
 
 
 bundle(Rules, RULES)
-bundle(Strain, STRAIN)
+bundle(Scales, SCALES)
 bundle(Rates, RATES)
 bundle(Poses, POSES)
 bundle(Roots, ROOTS)
@@ -149,7 +149,7 @@ def make_run(tag, model, tables, tangent, settings, limits, history, member_stat
     return AdaptiveRun(
         step,
         _rules(tag, model, tangent, settings, limits, step.size),
-        _no_strain(model),
+        _no_scales(model),
         _no_rates(model),
         Poses(0.0, 0.0, 0.0, np.inf, np.bool_(True)),
         Roots(np.inf, nobody, 0.0, -np.inf, settings[0] ** NEAREST),
@@ -171,7 +171,7 @@ def make_run(tag, model, tables, tangent, settings, limits, history, member_stat
         none,
         none,
         none,
-        Crowd(none, t),
+        Chatter(none, t),
     )
 
 
@@ -196,19 +196,20 @@ def _rules(tag, model, tangent, settings, limits, size):
         s,
         order,
         has_switches(model, np.bool_(True)),
-        has_curves(model),
+        np.bool_(False),
         explicit and model.contact_pair.shape[0] > 0,
         explicit and method_number(model) == 1 and not settings[2] > 0.0,
         ROUNDING * size,
         settings[0] * size,
+        model.times[model.times.shape[0] - 1] - model.times[0],
     )
 
 
 @kernel
-def _no_strain(model):
-    """A `Strain` before the start."""
+def _no_scales(model):
+    """A `Scales` before the start."""
     n_pair = model.pair.shape[0]
-    return Strain(
+    return Scales(
         np.empty((n_pair, pose_size(model))),
         np.empty(model.v0.shape[0]),
         np.zeros(n_pair),

@@ -15,9 +15,9 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.members import (
+    curved_members,
     knotted_at,
-    may_meet,
-    meeting,
+    note_motion,
     scale_general,
     shortest_at_start,
 )
@@ -29,7 +29,7 @@ from mdstopo.general.integrators.adaptive_length import plan_step
 from mdstopo.general.integrators.adaptive_run import make_run, reject
 from mdstopo.general.integrators.adaptive_switch import end_at_switch, go_on_behind
 from mdstopo.general.integrators.braking import brake_rate
-from mdstopo.general.integrators.runge_kutta_step import advance
+from mdstopo.general.integrators.runge_kutta_step import advance_trial
 from mdstopo.general.steps.first_step import first_step
 from mdstopo.general.steps.method_interface import UNSOLVED, scheme
 from mdstopo.general.steps.run_start import log_start, method_number, motion_at_start
@@ -45,7 +45,7 @@ from mdstopo.integrators.steps import (
     SINGULAR,
     STABLE,
 )
-from mdstopo.mechanics.kinematics.kinematics_interface import deflection, drive_state, relative_pose
+from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, relative_pose
 
 
 @kernel
@@ -94,9 +94,10 @@ def _begin(tag, run, tolerance):
 
     Returns OK, or the code with which the run ends.
     """
-    step, rules, strain, history, where = run.step, run.rules, run.strain, run.history, run.where
+    step, rules, scales, history, where = run.step, run.rules, run.scales, run.history, run.where
     model, member_state, workspace = step.model, step.member_state, step.workspace
     history.mass[0] = 0.0
+    rules.curved = curved_members(model, member_state)[0] > 0
     drive_state(model, np.int64(0), run.t, step.q0, step.v0)
     singular = balance_at_start(
         model, member_state, workspace, step.q0, step.v0, run.a0, run.lam, knotted_at(tolerance), rules.graze, where
@@ -108,11 +109,11 @@ def _begin(tag, run, tolerance):
         return SINGULAR
     run.poses.sigma = least_singular_value(model, workspace)
     run.poses.largest = run.poses.sigma
-    relative_pose(model, step.q0, step.v0, strain.rel0)
-    motion_at_start(model, member_state, workspace, strain.rel0, step.v0, strain.scale, strain.motion, strain.noise)
-    shortest_at_start(model, strain.rel0, strain.shortest)
-    for p in range(strain.scale.shape[0]):
-        strain.shaken += abs(strain.scale[p]) * strain.noise[p]
+    relative_pose(model, step.q0, step.v0, scales.rel0)
+    motion_at_start(model, member_state, workspace, scales.rel0, step.v0, scales.scale, scales.motion, scales.noise)
+    shortest_at_start(model, scales.rel0, scales.shortest)
+    for p in range(scales.scale.shape[0]):
+        scales.shaken += abs(scales.scale[p]) * scales.noise[p]
     if rules.switching:
         events = log_start(member_state, history)
         if events < 0:
@@ -120,7 +121,7 @@ def _begin(tag, run, tolerance):
         run.events = events
     if not rules.fixed_step > 0.0:
         run.wanted = first_step(
-            model, member_state, model.times[1], step.q0, step.v0, run.a0, strain.rel0, strain.motion, strain.noise,
+            model, member_state, model.times[1], step.q0, step.v0, run.a0, scales.rel0, scales.motion, scales.noise,
             rules.tolerance, rules.order, scheme(tag, method_number(model))[2], workspace, run.lam, step.q[0],
             step.v[0], step.a[0], run.work,
         )  # fmt: skip
@@ -146,27 +147,20 @@ def _pass_breakpoint(run, segment):
         step.model, step.member_state, segment, run.t, step.q0, step.v0, step.watched, step.workspace, run.a0, run.lam,
         history, count, run.events, run.rules.rounding, run.work, run.where,
     )  # fmt: skip
-    if events < 0:
-        run.events = 0
-        return NEEDS_ROOM
-    run.events = events
-    return OK
+    run.events = max(events, 0)
+    return OK if events >= 0 else NEEDS_ROOM
 
 
 @kernel
 def _take_step(tag, run):
     """Make a step, and keep it or have a shorter one made; returns OK, or the code with which the run ends."""
-    step, trial, history = run.step, run.trial, run.history
+    trial, history = run.trial, run.history
     code = plan_step(run)
     if code != OK:
         return code
     if run.count + 4 > history.t.shape[0] or run.stages + INSIDE + run.rules.s > history.when.shape[0]:
         return NEEDS_ROOM
-    singular = advance(
-        tag, step.model, step.table, run.rules.s, step.member_state, run.segment, run.t, trial.h, step.q0, step.v0,
-        run.rules.tangent, run.stages, step.workspace, run.lam, step.q, step.v, step.a, history, run.end_q, run.end_v,
-        run.push, step.size, run.work,
-    )  # fmt: skip
+    singular = advance_trial(tag, run)
     if singular >= 0:
         return _without_end(run, singular)
     good, code = judge_step(tag, run)
@@ -192,8 +186,7 @@ def _without_end(run, singular):
 
     A long step may have gone beyond a singular pose, a shorter one need not; a very short one is at it.
     """
-    times = run.step.model.times
-    if not run.trial.h < 1e-9 * (times[times.shape[0] - 1] - times[0]):
+    if not run.trial.h < 1e-9 * run.rules.span:
         reject(run, run.rules.s, 0.25 * run.trial.h)
         return OK
     run.where[0] = singular if singular != UNSOLVED else -1
@@ -203,16 +196,15 @@ def _without_end(run, singular):
 @kernel
 def _keep(run):
     """Keep the step that has been made: its end is the start of the next one."""
-    step, trial, poses, roots, model = run.step, run.trial, run.poses, run.roots, run.step.model
+    step, trial, scales, poses, roots, model = run.step, run.trial, run.scales, run.poses, run.roots, run.step.model
     poses.largest = max(poses.largest, poses.at_end)
     poses.way = way_to_pose(trial.h, poses.sigma, poses.at_end, poses.largest)
     poses.sigma = poses.at_end
     poses.reaches = np.bool_(True)
-    for p in range(run.strain.motion.shape[0]):
-        run.strain.motion[p] = max(run.strain.motion[p], deflection(model, run.rel, run.strain.rel0, p))
-    if run.where[1] < 0 and may_meet(run.strain.shortest, run.strain.motion):
-        relative_pose(model, step.q0, step.v0, run.before)
-        run.where[1] = meeting(model, run.segment, run.t, step.member_state, run.before, run.rel)
+    note_motion(
+        model, run.segment, run.t, step.member_state, step.q0, step.v0, run.rel, scales.rel0, scales.shortest,
+        scales.motion, run.before, run.where,
+    )  # fmt: skip
     run.rates.ended = trial.h if run.rules.measures and trial.stages == run.rules.s and not trial.happens else 0.0
     run.t = model.times[run.segment + 1] if trial.lands else run.t + trial.h
     if trial.happens or run.t >= roots.ahead:

@@ -10,7 +10,7 @@ from mdstopo.general.events.events import is_doubtful, smallest_margin, watch_ne
 from mdstopo.general.events.landing import CORRECTIONS, first_event
 from mdstopo.general.events.locate import AIM, NEAR, RESOLUTION, is_sharp, time_to_sharp
 from mdstopo.general.integrators.adaptive_run import reject
-from mdstopo.general.integrators.runge_kutta_step import advance
+from mdstopo.general.integrators.runge_kutta_step import advance_trial
 from mdstopo.general.steps.method_interface import is_explicit, make_stages
 from mdstopo.general.steps.step_history import copy_vector
 from mdstopo.integrators.runge_kutta_tables import INSIDE
@@ -139,11 +139,7 @@ def _advance_to_switch(tag, run, c, rate):
     at_before = 0.0
     value = 0.0
     for tries in range(CORRECTIONS):
-        singular = advance(
-            tag, step.model, step.table, run.rules.s, step.member_state, run.segment, run.t, trial.h, step.q0, step.v0,
-            run.rules.tangent, run.stages, step.workspace, run.lam, step.q, step.v, step.a, run.history, run.end_q,
-            run.end_v, run.push, step.size, run.work,
-        )  # fmt: skip
+        singular = advance_trial(tag, run)
         run.work[OF_SWITCHES] += run.rules.s if tries > 0 else 0
         if singular >= 0:
             return True
@@ -178,16 +174,15 @@ def go_on_behind(run):
         model, step.member_state, run.segment, run.t, step.q0, step.v0, step.watched, step.workspace, run.a0, run.lam,
         run.history, run.count, run.events, run.rules.graze, run.rules.rounding, run.work, run.where,
     )  # fmt: skip
+    run.events = max(events, 0)
     if events < 0:
-        run.events = 0
         return NEEDS_ROOM
-    run.events = events
     if is_sharp(model, run.t, step.member_state, run.rel, run.trial.who):
         roots.since = run.t
     else:
         run.wanted = max(run.wanted, roots.usual)
     roots.usual = 0.0
-    if note_switch(run.crowd, run.t, model.times):
+    if note_switch(run.chatter, run.t, model.times):
         run.where[0] = run.trial.who
         return CHATTERING
     return OK

@@ -16,7 +16,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.dynamics.accelerations import solve_accelerations
-from mdstopo.general.dynamics.members import may_meet, meeting, scale_general, shortest_at_start
+from mdstopo.general.dynamics.members import note_motion, scale_general, shortest_at_start
 from mdstopo.general.events.event_log import log_at_breakpoint, log_switches, note_switch
 from mdstopo.general.events.events import watch_all
 from mdstopo.general.events.start_balance import balance_at_start
@@ -45,7 +45,7 @@ from mdstopo.integrators.steps import (
     STEP_LIMIT,
     STEP_TOO_SMALL,
 )
-from mdstopo.mechanics.kinematics.kinematics_interface import deflection, drive_state, relative_pose
+from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, relative_pose
 from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 
 TAG = (0, 0)
@@ -191,11 +191,10 @@ def _take_step(run, most):
 def _keep(run):
     """Keep the step that has been made: its end is the start of the next one."""
     model, pace, trial = run.model, run.pace, run.trial
-    for p in range(run.rel.shape[0]):
-        run.extent[0, p] = max(run.extent[0, p], deflection(model, run.rel, run.rel0, p))
-    if run.where[1] < 0 and may_meet(run.shortest, run.extent[0]):
-        relative_pose(model, run.q, run.state[VELOCITY], run.before)
-        run.where[1] = meeting(model, pace.segment, pace.t, run.member_state, run.before, run.rel)
+    note_motion(
+        model, pace.segment, pace.t, run.member_state, run.q, run.state[VELOCITY], run.rel, run.rel0, run.shortest,
+        run.extent[0], run.before, run.where,
+    )  # fmt: skip
     pace.done += 1.0
     pace.known += 1
     if trial.lands:
@@ -246,7 +245,7 @@ def _go_on_behind(run):
     pace.events = max(events, 0)
     if events < 0:
         return NEEDS_ROOM
-    if note_switch(run.crowd, pace.t, model.times):
+    if note_switch(run.chatter, pace.t, model.times):
         run.where[0] = run.trial.who
         return CHATTERING
     _divide(run)

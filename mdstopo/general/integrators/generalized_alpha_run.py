@@ -9,7 +9,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.dynamics.accelerations import make_workspace
-from mdstopo.general.events.event_log import Crowd
+from mdstopo.general.events.event_log import Chatter
 from mdstopo.general.events.events import has_switches, room_for_watched
 from mdstopo.general.events.locate import CUTS
 from mdstopo.general.integrators.generalized_alpha_step import VELOCITY, advance, make_step_room
@@ -22,7 +22,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import pose_size
 RULES = ("radius", "newton_tolerance", "step", "size", "rounding", "graze", "switching")
 PACE = ("segment", "t", "begin", "pieces", "done", "known", "count", "stages", "events")
 PARTS = (
-    "model", "rules", "pace", "trial", "crowd", "member_state", "watched", "workspace", "history", "q", "state",
+    "model", "rules", "pace", "trial", "chatter", "member_state", "watched", "workspace", "history", "q", "state",
     "end_q", "ends", "push", "guess", "a0", "lam", "extent", "rel0", "rel", "before", "shortest", "step_room",
     "switch_room", "where", "work",
 )  # fmt: skip
@@ -56,7 +56,7 @@ class Pace:
 class FixedRun:
     """A run in fixed steps, inside kernels.
 
-    model: the compiled scene. rules, pace, trial, crowd: a `FixedRules`, `Pace`, `Trial`, `event_log.Crowd`.
+    model: the compiled scene. rules, pace, trial, chatter: a `FixedRules`, `Pace`, `Trial`, `event_log.Chatter`.
     workspace, history, q, state, end_q, ends, push, guess, extent, rel0, step_room, work: as of
     `generalized_alpha_step.advance`. member_state (3, columns): scale, mode and permanent set. watched: as of
     `events.smallest_margin`. a0 (n,), lam (n_row,): accelerations and multipliers at the start, and behind switches and
@@ -122,7 +122,7 @@ def make_run(model, radius, settings, history, member_state, where, work):
         ),
         Pace(none, t, t, 0.0, 0.0, none, none, none, none),
         Trial(0.0, no, none, no, np.int64(-1)),
-        Crowd(none, t),
+        Chatter(none, t),
         member_state,
         room_for_watched(model),
         make_workspace(model),

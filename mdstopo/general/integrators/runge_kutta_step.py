@@ -71,3 +71,17 @@ def advance(
     end_state(model, table, s, h, q0, v0, q, v, a, workspace.slopes, end_q, end_v)
     drive_state(model, segment, t + h, end_q, end_v)
     return project(model, size, end_q, end_v, workspace, push[0], push[1])
+
+
+@kernel
+def advance_trial(tag, run):
+    """`advance` of the step that a run is making, of the length `run.trial.h`, whose stages are kept.
+
+    tag: the method of integration. run: the run (`adaptive_run.AdaptiveRun`).
+    """
+    step, rules = run.step, run.rules
+    return advance(
+        tag, step.model, step.table, rules.s, step.member_state, run.segment, run.t, run.trial.h, step.q0, step.v0,
+        rules.tangent, run.stages, step.workspace, run.lam, step.q, step.v, step.a, run.history, run.end_q, run.end_v,
+        run.push, step.size, run.work,
+    )  # fmt: skip

@@ -17,6 +17,7 @@ from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.over_time.kinks import kinks
 from mdstopo.general.responses.general_responses import LISTED, has_kinks, is_expression, switches_of
 from mdstopo.general.scene.extent import size_of
+from mdstopo.general.steps.run_start import method_number
 from mdstopo.general.steps.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
@@ -113,7 +114,7 @@ def _rule(driver: DriverWithRun, count: int) -> FloatArray:
         least = int(np.diff(first).min())
         rule: FloatArray = tables[LEVELS.index(least), 0, :2, :least]
         return rule
-    method = 1 if model.size[2] != 0 else 0
+    method = method_number.py_func(model)  # type: ignore[attr-defined]
     vectors = tables[method, 2, :, : STAGES[method]]
     weighed = vectors[2] != 0.0
     return np.stack([vectors[0][weighed], vectors[2][weighed]])
