@@ -96,6 +96,8 @@ class DesignProblem:
             or self.even > 0
             or any(not kind_of(objective.response).is_energy for objective in self._objectives)
         )
+        #: no U is below it: a length cannot be less than 0
+        self.least = 0.0 if one and never_negative(self._objectives[0]) else -np.inf
         aims: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
         members = any(kind_of(each.response).of_members for each in aims)
         # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
@@ -336,6 +338,13 @@ def _signed(sign: float, slope: Floats) -> Floats:
 def sign_of(objective: Objective) -> float:
     """-1 where an objective is to be maximised, else 1."""
     return -1.0 if objective.sense == "maximize" else 1.0
+
+
+def never_negative(objective: Objective) -> bool:
+    """Whether an objective is to be lowered and cannot be below zero: a length, a magnitude, a mean square."""
+    response = objective.response
+    is_length = kind_of(response).never_negative or response.component == "norm"
+    return sign_of(objective) > 0.0 and (is_length or REDUCTIONS[objective.over_time].ignores_sign)
 
 
 def competes(aim: Objective | ResponseRow, sign: float) -> bool:

@@ -71,6 +71,7 @@ class Gsao:
         self.separable = SeparableMethod(space, self._measures, settings, getattr(problem, "competitors", None))
         #: whether rows compete from the start; else the separable model begins
         self.competes = bool(getattr(problem, "competes", False))
+        self.least = float(getattr(problem, "least", -np.inf))
         self.bundle = self._bundle_method(space) if settings.flag("bundle") else None
 
     def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
@@ -126,7 +127,7 @@ class Gsao:
     def terminate(self, state: State) -> tuple[RunStatus, str]:
         """Whether a state goes on, and if not why."""
         assert isinstance(state, GsaoState)
-        return verdict(state, self._is_stuck(state), self.settings)
+        return verdict(state, self._is_stuck(state), self.settings, self.least)
 
     # The steps of the loop.
 

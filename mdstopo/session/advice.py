@@ -18,6 +18,8 @@ _USED = 0.9  # share of a volume limit below which it is far from active
 _LARGER = 1.05  # ratio of relative motions from which one exceeds the other
 #: share of the scene's size, or of a radian, by which prescribed motions of two designs differ at most
 _SAME = 1e-6
+#: share of an objective by which a variable changes it, across its whole range, where the slope is rounding alone
+_ROUNDING = 1e-13
 
 
 def advise(case: Case, design: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
@@ -56,15 +58,17 @@ def without_slope(case: Case, found: Evaluation) -> tuple[str, ...]:
     """Warnings about objectives that no design variable changes at the design that was found.
 
     To the optimiser such a design is an optimum, whatever it is: acceleration at the start, before any member carries
-    something, or a response that `constant_load` holds.
+    something, a pendulum that swings from one side to the other whatever holds it, or a response that `constant_load`
+    holds.
     """
     weights = case.combine.weights if case.combine is not None else {}
     told = []
     for objective in case.objectives:
         name = objective.name
-        slopes = [found.gradients.get(name), *getattr(found, "variable_gradients", {}).get(name, {}).values()]
         value = found.objectives.get(name, 0.0)
-        if slopes[0] is None or any(np.any(each) for each in slopes) or value == 0.0 or weights.get(name, 1.0) == 0.0:
+        if found.gradients.get(name) is None or value == 0.0 or weights.get(name, 1.0) == 0.0:
+            continue
+        if _largest_change(case, found, name) > _ROUNDING * abs(value):
             continue
         time = found.peaks[name][0].time
         where = "" if np.isnan(time) else f" at t = {time:.6g} s"
@@ -73,6 +77,16 @@ def without_slope(case: Case, found: Evaluation) -> tuple[str, ...]:
             "the optimiser had nothing to go by there"
         )
     return tuple(told)
+
+
+def _largest_change(case: Case, found: Evaluation, name: str) -> float:
+    """The largest change of an objective that its slope promises for one variable's whole range."""
+    slopes = getattr(found, "variable_gradients", {}).get(name, {})
+    of_alpha = np.abs(found.gradients[name]) * (case.upper - case.lower)
+    of_variables = [
+        np.abs(slopes[each.name]) * (each.upper - each.lower) for each in case.variables if each.name in slopes
+    ]
+    return float(np.concatenate([of_alpha, *of_variables]).max(initial=0.0))
 
 
 def may_soften(case: Case, load_case: str) -> bool:

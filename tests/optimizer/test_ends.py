@@ -58,6 +58,35 @@ def test_a_smooth_minimum_inside_the_bounds_converges_although_its_gradient_vani
         assert np.allclose(state.best_alpha, [0.4, 0.6], atol=1e-5)
 
 
+def distance(x):
+    """How far x is from (0.4, 0.6), which has no slope there; its direction where it is not."""
+    away = x - [0.4, 0.6]
+    length = float(np.hypot(*away))
+    return np.array([length]), (away / length if length > 0.0 else np.array([0.0, 1.0]))[None]
+
+
+def test_what_has_come_to_the_least_that_is_possible_has_converged() -> None:
+    problem = Toy(distance, [0.9, 0.1], 0.0, 1.0)
+    assert ended(problem).status is RunStatus.STALLED
+    problem.least = 0.0
+    state = ended(problem)
+    assert state.status is RunStatus.CONVERGED
+    assert "cannot be below 0" in state.reason
+    assert state.best_objective < 1e-6
+
+
+def test_a_bound_that_is_not_reached_makes_nothing_converge() -> None:
+    """The same beside a limit that keeps x_0 below 0.3, where no slope is zero: as good as without a bound."""
+    limit = LinearRows(np.array([[1.0, 0.0]]), np.array([0.3]), np.array([False]))
+    ends = []
+    for least in (-np.inf, 0.0):
+        problem = Toy(distance, [0.1, 0.1], 0.0, 1.0, limit)
+        problem.least = least
+        ends.append(ended(problem))
+    assert ends[0].reason == ends[1].reason
+    assert ends[1].best_objective > 0.09
+
+
 def test_the_residual_is_relative_to_the_highest_row_and_not_to_a_steeper_one_that_does_not_compete() -> None:
     """Row 1, far below, is a hundred thousand times as steep: x_0 has half of its range to go nevertheless."""
     slopes = np.array([[1e-3, 0.0], [0.0, 100.0]])

@@ -123,7 +123,13 @@ def test_an_objective_that_no_variable_changes_is_told_with_its_time() -> None:
     ids=["slope", "identically zero", "variable"],
 )
 def test_nothing_is_said_of_an_objective_that_something_changes_or_that_is_zero(what: SimpleNamespace) -> None:
-    assert without_slope(case(), what) == ()
+    stated = "design: {variables: {stiffness: {group: belts, parameter: stiffness, lower: 100, upper: 300}}}"
+    assert without_slope(case(more=stated), what) == ()
+
+
+def test_slopes_of_rounding_are_none() -> None:
+    (told,) = without_slope(case(), found(np.array([1e-15])))
+    assert "no design variable changes G = 3" in told
 
 
 PUSHED = """

@@ -41,6 +41,7 @@ class ResponseKind(Value):
     in_space: the word for the same in space, where a planar case is lifted there; empty where nobody has said which.
     is_component: whether that is a vector in space, of which the planar one is the component along the normal.
     of_axis: whether its numbers are a direction in body coordinates.
+    never_negative: whether it is a length or an angle without sign, whatever its keys say.
     """
 
     word: str
@@ -59,6 +60,7 @@ class ResponseKind(Value):
     in_space: str = ""
     is_component: bool = False
     of_axis: bool = False
+    never_negative: bool = False
 
 
 RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
@@ -265,6 +267,7 @@ RESPONSES: dict[str, ResponseKind] = {
             keys=_OF_GROUP,
             made=_of_group,
             of_members=True,
+            never_negative=True,
             in_space="member_force",
         ),
         ResponseKind(
@@ -274,6 +277,7 @@ RESPONSES: dict[str, ResponseKind] = {
             kernels="mdstopo.general.responses.general_responses:OF_JOINT_FORCE",
             keys=_OF_JOINT,
             made=_of_joint,
+            never_negative=True,
             in_space="joint_force",
         ),
         ResponseKind(
@@ -283,6 +287,7 @@ RESPONSES: dict[str, ResponseKind] = {
             kernels="mdstopo.general.responses.general_responses:OF_JOINT_MOMENT",
             keys=_OF_JOINT,
             made=_of_joint,
+            never_negative=True,
             in_space="joint_moment",
         ),
     )

@@ -132,6 +132,7 @@ SPATIAL_RESPONSES: dict[str, ResponseKind] = {
             is_position=True,
             depends_on_rate=False,
             of_axis=True,
+            never_negative=True,
         ),
         _of_others("member_force"),
         _of_others("joint_force"),
