@@ -143,11 +143,12 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
 
 def _say_what_stays_open(output: Output, case: "Case") -> None:
     """Say before kernels are compiled, which takes a minute, what will not be known even then."""
-    from mdstopo.cli.check_cost import UNKNOWN
+    from mdstopo.cli.check_cost import NOT_COMPILED
     from mdstopo.warm import compilation_due
 
     if case.objectives and compilation_due(case):
-        output.notice(f"what one evaluation costs will be {UNKNOWN}; frequencies and freedoms need fewer")
+        why = f"{NOT_COMPILED}; frequencies and freedoms need fewer"
+        output.notice(f"what one evaluation costs will not be known: {why}")
 
 
 def _say_cost(output: Output, case: "Case", engine: "Evaluator") -> dict[str, Any] | None:

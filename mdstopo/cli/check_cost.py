@@ -12,9 +12,8 @@ if TYPE_CHECKING:
 #: an evaluation that took longer than this (s) is not made once more, to leave out what is only done the first time
 ONCE = 2.0
 #: what is said where kernels would have to be compiled
-UNKNOWN = (
-    "not known: kernels that it needs have not been compiled here yet; the first `gradient` or `run` compiles them"
-)
+NOT_COMPILED = "kernels that it needs have not been compiled here yet; the first `gradient` or `run` compiles them"
+UNKNOWN = f"not known: {NOT_COMPILED}"
 
 
 def cost(case: "Case", engine: "Evaluator") -> dict[str, Any] | None:

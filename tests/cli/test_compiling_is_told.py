@@ -53,5 +53,5 @@ def test_check_says_before_it_compiles_that_it_will_not_know_the_cost(
     monkeypatch.setattr(warm, "compilation_due", lambda case: due)
     _say_what_stays_open(Output(), read_case(f"{BODY}{goals}}}"))
     told_before = capsys.readouterr().err
-    assert told_before.startswith("what one evaluation costs will be not known: ") is said
+    assert told_before.startswith("what one evaluation costs will not be known: ") is said
     assert ("the first `gradient` or `run` compiles them" in told_before) is said

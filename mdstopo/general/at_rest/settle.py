@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.general.at_rest.free_turns import FreeTurns, free_turns
 from mdstopo.general.driver_interface import DriverWithStart
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray
@@ -34,6 +35,8 @@ BACK, TRIALS = 0.1, 30
 NEAR, ARRIVED = 1e-6, 1e-13
 #: stiffness, relative to the largest, below which a direction counts as free
 FREE = 1e-9
+#: how often what turns freely is turned back at most, and how far from its heading it is then at most, rad
+TURNS_BACK, HEADING = 100, 1e-12
 
 
 def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:
@@ -41,8 +44,43 @@ def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: flo
 
     size: of the scene, m.
     """
-    bodies = driver.scene.kinematics
+    bodies, names = driver.scene.kinematics, driver.scene.bodies
     scene = _AtRest(driver, alpha, size)
+    q = q0
+    for _ in range(TURNS_BACK):
+        q, found = _equilibrium(scene, q, size)
+        if not found or scene.pushed():
+            return _nowhere(driver, bodies.difference(q, q0), scene.arms)
+        free = scene.free_turns(q, q0)
+        if isinstance(free, int):
+            return f"body {names[free]} is free to turn, so that its equilibrium is not determined"
+        if np.abs(free.angles).max(initial=0.0) <= HEADING:
+            break
+        back = free.back()
+        q = bodies.retract(q, min(1.0, FAR * size / scene.extent(back)) * back)
+    else:
+        return _nowhere(driver, bodies.difference(q, q0), scene.arms)
+    shift, turn = bodies.shifts_and_turns(bodies.difference(q, q0))
+    distance, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
+    far_body, turned_body = int(distance.argmax()), int(angle.argmax())
+    return Settled(
+        q,
+        free.kept(scene.inverse()),
+        float(distance[far_body]),
+        names[far_body],
+        float(angle[turned_body]),
+        names[turned_body],
+    )
+
+
+def _equilibrium(scene: "_AtRest", q0: FloatArray, size: float) -> tuple[FloatArray, bool]:
+    """Where a search from q0 (n_q,) ends, and whether that is an equilibrium."""
+    q, near = _downhill(scene, q0, size)
+    return _newton(scene, q, size) if near else (q, False)
+
+
+def _downhill(scene: "_AtRest", q0: FloatArray, size: float) -> tuple[FloatArray, bool]:
+    """Go from q0 (n_q,) by implicit steps as far as Newton's can take over; where that is, and whether it is near."""
     q = scene.land(q0.copy())
     rate, left = scene.rate(), scene.left()
     pace = 1.0 / rate if rate > 0.0 else size / max(float(np.linalg.norm(left)), 1e-300)
@@ -58,35 +96,27 @@ def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: flo
             pace *= GROWTH
         elif off > ahead:
             pace *= 0.5
-        gone = bodies.difference(q, q0)
-        if scene.lost(gone):
-            return _nowhere(driver, gone, scene.arms)
+        if scene.lost(scene.bodies.difference(q, q0)):
+            return q, False
         if share * far <= NEAR * size and pace * scene.rate() > 1.0:
             break
+    return q, True
+
+
+def _newton(scene: "_AtRest", q: FloatArray, size: float) -> tuple[FloatArray, bool]:
+    """Newton's steps from q (n_q,), at which the scene has been looked at: where they end, and whether that is an
+    equilibrium."""
     far = np.inf
     for _ in range(20):
-        inverse = scene.inverse()
-        step = scene.onto() + inverse @ scene.force
+        step = scene.onto() + scene.inverse() @ scene.force
         before, far = far, scene.extent(step)
         if not far < 1e-3 * size:
             break
-        q = bodies.retract(q, step)
+        q = scene.bodies.retract(q, step)
         scene.at(q)
         if far <= ARRIVED * size or far >= 0.5 * before:
             break
-    inverse = scene.inverse()
-    if not far <= 1e-9 * size or scene.pushed():
-        return _nowhere(driver, bodies.difference(q, q0), scene.arms)
-    turning = scene.turns_freely()
-    if turning >= 0:
-        return f"body {driver.scene.bodies[turning]} is free to turn, so that its equilibrium is not determined"
-    shift, turn = bodies.shifts_and_turns(bodies.difference(q, q0))
-    distance, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
-    names = driver.scene.bodies
-    far_body, turned_body = int(distance.argmax()), int(angle.argmax())
-    return Settled(
-        q, inverse, float(distance[far_body]), names[far_body], float(angle[turned_body]), names[turned_body]
-    )
+    return q, bool(far <= 1e-9 * size)
 
 
 def _stepped(
@@ -217,14 +247,14 @@ class _AtRest:
         scale = self.rate() * self._size * float(self._root.max(initial=0.0))
         return bool(modes.size) and float(np.abs(modes.T @ self.pull).max()) > FREE * scale
 
-    def turns_freely(self) -> int:
-        """A body that turns in a direction that nothing holds, or -1."""
-        modes = np.abs(self._null() / self._root[:, None]) * self.arms[self.free][:, None]
-        each = self.bodies.freedoms
-        angle = self.free % each >= each - self.bodies.rotations
-        if not modes.size or modes[angle].max(initial=0.0) <= 1e-6 * modes.max():
-            return -1
-        return int(self.free[angle][int(modes[angle].max(axis=1).argmax())]) // each
+    def free_turns(self, q: FloatArray, stated: FloatArray) -> FreeTurns | int:
+        """What turns freely at q (n_q,); or a body that turns so where it has no heading."""
+        null = self._null()
+        modes = np.zeros((len(self.force), null.shape[1]))
+        modes[self.free] = null / self._root[:, None]
+        scene = self._driver.scene
+        up = np.asarray(scene.load_case.gravity, dtype=np.float64)
+        return free_turns(self.bodies, modes, self.bodies.headings(scene.model.home, up, q, stated))
 
     def extent(self, step: FloatArray) -> float:
         """How far a step (n,) goes: the largest shift of a centre, or angle times the scene's size, m."""

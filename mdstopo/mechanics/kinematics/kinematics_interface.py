@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import FunctionType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -100,6 +100,21 @@ class Kinematics:
     def differences(self, after: FloatArray, before: FloatArray) -> FloatArray:
         """The changes (T, n) that lead from coordinates (n_q,) to those of many states (T, n_q)."""
         return after - before
+
+    def headings(self, home: FloatArray, up: FloatArray, q: FloatArray, stated: FloatArray) -> "Headings":
+        """How far bodies at coordinates q (n_q,) have turned about `up` since others. home: of the model; up: a
+        direction, or zeros where there is none; no matter in a plane."""
+        turned = self.shifts_and_turns(self.difference(q, stated))[1]
+        return Headings(turned[:, 0], np.ones_like(turned), np.ones_like(turned))
+
+
+class Headings(NamedTuple):
+    """Of each body the angle (n_body,) that it has turned about a direction; the change of a turn (n_body, T) that
+    turns it further; and the derivative (n_body, T) of the angle by a change of the turn."""
+
+    angle: FloatArray
+    axis: FloatArray
+    slope: FloatArray
 
 
 # Sizes, which are constants where a kernel is compiled

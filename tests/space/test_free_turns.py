@@ -1,0 +1,103 @@
+"""Loads that stand on a floor: nothing holds their heading at rest, and they keep the one that the case states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import mdstopo
+from mdstopo.case.reader import read_case
+from mdstopo.case.text.errors import CaseError
+from mdstopo.mechanics.kinematics.spatial import SPATIAL
+from tests.general.support import slopes
+
+#: a crate that stands askew on four feet, with a lamp that springs hold above it
+CRATE = """
+format: 1
+dimension: 3
+time: {end: 0.02}
+gravity: [0, 0, -9.81]
+bodies:
+  crate: {mass: 100, inertia: [12, 10, 14], position: [0.1, 0.05, 0.5], orientation: {axis: [0, 0, 1], angle: 0.3}}
+  lamp: {mass: 5, inertia: [0.2, 0.1, 0.3], position: [0.3, 0.05, 1.2]}
+points:
+  feet: {body: crate, frame: global, grid: {list: [[0.6, 0.5, 0], [0.5, -0.5, 0], [-0.5, 0.5, 0], [-0.5, -0.5, 0]]}}
+  roof: {body: crate, frame: global, grid: {list: [[0.6, 0.5, 1], [0.5, -0.5, 1], [-0.5, 0.5, 1]]}}
+  lugs: {body: lamp, frame: global, grid: {list: [[0.4, 0.1, 1.2], [0.3, -0.2, 1.3], [0.2, 0.1, 1.3]]}}
+contacts:
+  - {points: feet, on: {body: ground, plane: {at: [0, 0, 0], normal: [0, 0, 1]}}, stiffness: 20000}
+members:
+  ties: {from: roof, to: lugs, law: {type: spring, stiffness: 3000}}
+objectives:
+  x: {response: {displacement: {body: lamp, component: x}}, over_time: final}
+  y: {response: {displacement: {body: lamp, component: y}}, over_time: final}
+  z: {response: {rotation: {body: lamp, component: z}}, over_time: final}
+  tilt: {response: {tilt: {body: crate}}, over_time: final}
+combine: {weights: {x: 1, y: 1, z: 1, tilt: 1}}
+solver: {settle: true, tolerance: 1.0e-10}
+"""
+
+
+def twist(turn: Rotation) -> float:
+    """The angle about the vertical of a turn that is one about the vertical and one about a level axis."""
+    _, _, z, w = turn.as_quat()
+    return float(2.0 * np.arctan2(z, w))
+
+
+def test_a_load_settles_with_its_heading_and_gradients_know_where() -> None:
+    case = read_case(CRATE)
+    alpha = np.random.default_rng(0).uniform(0.3, 1.0, case.n_design)
+    q = mdstopo.simulate(case, alpha).q[0]
+    crate, lamp = (Rotation.from_quat(q[at : at + 4], scalar_first=True) for at in (3, 10))
+    assert 1e-3 < (crate * Rotation.from_rotvec([0, 0, 0.3]).inv()).magnitude() < 0.1
+    assert abs(twist(crate) - 0.3) < 1e-12
+    assert abs(twist(lamp)) > 1e-3  # which turns with the crate alone
+    weighed = q[:2] * 100 + q[7:9] * 5  # no force along the floor
+    assert np.abs(weighed - 100 * np.array([0.1, 0.05]) - 5 * np.array([0.3, 0.05])).max() < 1e-9
+    found = mdstopo.evaluate(case, alpha)
+    direct = mdstopo.evaluate(case, alpha, method="direct")
+    direction = np.random.default_rng(2).normal(size=case.n_design) * alpha
+    differences = slopes(case, alpha, direction, 1e-3)
+    for name, gradient in found.gradients.items():
+        assert abs(differences[name] - gradient @ direction) < 1e-8 * np.abs(gradient * direction).max(), name
+        assert np.abs(direct.gradients[name] - gradient).max() < 1e-9 * np.abs(gradient).max(), name
+
+
+def test_a_wheel_that_turns_about_a_level_axis_has_no_heading_and_is_refused() -> None:
+    text = """
+format: 1
+dimension: 3
+gravity: [0, 0, -9.81]
+time: {end: 0.1}
+bodies: {wheel: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 1]}}
+joints: [{type: revolute, bodies: [ground, wheel], at: [0, 0, 1], axis: AXIS}]
+solver: {settle: true}
+"""
+    with pytest.raises(CaseError, match="body wheel is free to turn"):
+        mdstopo.simulate(read_case(text.replace("AXIS", "[0, 1, 0]")))
+    assert mdstopo.simulate(read_case(text.replace("AXIS", "[0, 0, 1]"))).status.ok
+
+
+def test_headings_and_their_slopes_are_those_of_the_turn_between_two_attitudes() -> None:
+    rng = np.random.default_rng(3)
+    up = np.array([0.3, -0.2, 0.9])
+    home = np.zeros((2, 21))
+    home[:, 3:12] = [Rotation.random(random_state=k).as_matrix().ravel() for k in (1, 2)]
+    turns = Rotation.from_rotvec(rng.uniform(-1.0, 1.0, (2, 2, 3)).reshape(-1, 3)).as_quat(scalar_first=True)
+    q, stated = (np.hstack([rng.normal(size=(2, 3)), each]).ravel() for each in (turns[:2], turns[2:]))
+    found = SPATIAL.headings(home, up, q, stated)
+
+    def angles(shift: np.ndarray) -> np.ndarray:
+        return SPATIAL.headings(home, up, SPATIAL.retract(q, shift), stated).angle
+
+    for body in range(2):
+        about = np.zeros(12)
+        about[6 * body + 3 : 6 * body + 6] = found.axis[body]
+        turned = angles(0.7 * about) - found.angle  # turning about the vertical adds up
+        assert np.abs(turned - 0.7 * np.eye(2)[body]).max() < 1e-13
+        for k in range(3):
+            step = np.zeros(12)
+            step[6 * body + 3 + k] = 1e-4
+            slope = (8.0 * (angles(step) - angles(-step)) - (angles(2 * step) - angles(-2 * step))) / 12e-4
+            assert abs(slope[body] - found.slope[body, k]) < 1e-11
