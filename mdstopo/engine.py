@@ -335,7 +335,8 @@ class Evaluator:
                 status, message = Status.ZERO_LENGTH, driver.member(meeting)
         work = work_named(driver.work.tolist())
         bodies = next(each.bodies for each in self.case.load_cases if each.name == load_case)
-        return Trajectory.of(load_case, steps, status, message, work, border_of(self.case, bodies))
+        names = tuple(body.name for body in bodies)
+        return Trajectory.of(load_case, steps, status, message, work, border_of(self.case, bodies), names)
 
     def trajectory_with_values(self, alpha: FloatArray, load_case: str) -> tuple[Trajectory, MotionValues]:
         """The motion of one load case with the design alpha (N,), and what objectives and constraints of it come to:

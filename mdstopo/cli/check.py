@@ -132,8 +132,9 @@ def _say_computed(output: Output, case: "Case") -> dict[str, Any]:
             output.say(f"load case {name}: {rest}")
     _say_frequencies(output, case, found)
     document |= _say_doubts(output, case, engine)
-    output.say("left out, because nothing asks for it")
-    for sentence in engine.skipped or ("nothing",):
+    if engine.skipped:
+        output.say("left out, because nothing asks for it")
+    for sentence in engine.skipped:
         output.say(f"  {sentence}")
     output.table([["integrator", f"{integrator}: {engine.integrator_reason}"]], indent="")
     document |= {"frequencies": found, "skipped": engine.skipped, "integrator": integrator}

@@ -34,7 +34,7 @@ class Trajectory:
     (T, n_rows): Lagrange multipliers (no rows without joints and motions). status: anything but OK means that it ends
     early, at t[-1], or goes on without being right (ZERO_LENGTH, STEP_TOO_LARGE); message says why. work: counts by
     name. reactions: Fx, Fy, M (T, 3), in space Fx, Fy, Fz, Mx, My, Mz (T, 6), of each joint on its first body, at the
-    joint, global axes. border: what makes of states of `steps` those of the case.
+    joint, global axes. border: what makes of states of `steps` those of the case. bodies: the names of the bodies.
     """
 
     load_case: str
@@ -49,6 +49,7 @@ class Trajectory:
     steps: Steps = field(repr=False)
     reactions: Mapping[str, FloatArray] = field(default_factory=dict)
     border: Border | None = field(default=None, repr=False)
+    bodies: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         why = f" ({self.message})" if self.message else ""
@@ -67,6 +68,7 @@ class Trajectory:
         message: str,
         work: dict[str, int],
         border: Border,
+        bodies: tuple[str, ...],
     ) -> "Trajectory":
         """The trajectory of steps.
 
@@ -75,6 +77,7 @@ class Trajectory:
         status, message: how the simulation ended, and why.
         work: counts by name.
         border: what makes of their states those of the case; it leaves out further bodies.
+        bodies: the names of the bodies.
         """
         t, lam = steps.t.copy(), np.zeros((len(steps.t), 0))
         q, v = border.places(steps.q), border.rates(steps.q, steps.v)
@@ -84,7 +87,7 @@ class Trajectory:
             (own_q, _, own_a), lam = steps.balanced(t)
             a = border.rates(own_q, own_a)
             reactions = steps.reactions(own_q, lam)
-        return cls(load_case, status, message, t, q, v, a, lam, work, steps, reactions, border)
+        return cls(load_case, status, message, t, q, v, a, lam, work, steps, reactions, border, bodies)
 
     def at(self, times: ArrayLike) -> States:
         """States at times (T,), from the integrator's own dense output.

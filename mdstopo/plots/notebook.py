@@ -116,9 +116,9 @@ def _trajectory(motion: Trajectory) -> tuple[list[Row], Callable[[Any], Any]]:
     def speeds(module: Any) -> Any:
         figure, (axis,) = new_figure(module)
         each = 3 if motion.q.shape[1] == motion.v.shape[1] else 6
-        for k in range(motion.v.shape[1] // each):
+        for k, name in enumerate(motion.bodies):
             places = motion.v[:, each * k : each * k + each // 2 + (each == 3)]
-            axis.plot(motion.t, np.linalg.norm(places, axis=1), color=COLOURS[k % len(COLOURS)], label=f"body {k}")
+            axis.plot(motion.t, np.linalg.norm(places, axis=1), color=COLOURS[k % len(COLOURS)], label=name)
         axis.set_xlabel("time, s")
         axis.set_ylabel("speed of the centre, m/s")
         axis.legend()
