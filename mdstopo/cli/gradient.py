@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 USUAL = (DEFAULT_SENSITIVITY, having("of_histories")[0])
 _TIGHT = 1e-12  # solver tolerance for differences: what the integrator leaves of noise is divided by the step
 _SHOWN = 6  # values of a variable that are shown
+_COMPETING = (0.3, 12)  # how far below the highest peaks are looked at, and how many
+_OFF = 1e-6  # from where on a difference from differences is looked into
 
 
 @click.command("gradient")
@@ -127,6 +129,7 @@ def command(
             datasets |= sensitivity_part(result["gradients"], method, result["by_variable"])
         if differencing and not failure:
             failure = _difference(case, alpha, count, results, datasets)
+            _look_into_differences(engine, alpha, count, results)
         if history and not failure:
             failure = _histories(engine, case, alpha, datasets)
         status = RunStatus.FAILED if failure else RunStatus.CONVERGED
@@ -263,6 +266,30 @@ def _difference(
             named = case.space.named(whole)
             datasets |= {f"differences/variables/{name}/{variable}": each for variable, each in named.items()}
     return ""
+
+
+def _look_into_differences(
+    engine: "Evaluator", alpha: "NDArray[np.float64]", count: int, results: dict[str, dict[str, Any]]
+) -> None:
+    """Note with the first method where differences are off because another peak becomes the highest within a step."""
+    from mdstopo.cli.gradient_numbers import changes_peak, chosen_members
+    from mdstopo.evaluation import Rows
+
+    result = next(iter(results.values()))
+    off = [name for name, difference in result.get("differences", {}).items() if difference > _OFF]
+    if not off:
+        return
+    case = engine.case
+    members = chosen_members(case.n_design, count, case.optimizer.seed)
+    peaks = engine.evaluate(alpha, rows=Rows(*_COMPETING)).peaks
+    size = float(alpha[: case.n_design].max(initial=0.0))
+    tied = [name for name in off if changes_peak(peaks[name], alpha, members, size)]
+    if tied:
+        told = [result["message"]] if result["message"] else []
+        result["message"] = "; ".join(
+            [*told, f"of {', '.join(tied)} another peak becomes decisive within a step of the differences, "
+             "which are no derivative there; the gradient is that of the peak which is decisive"]
+        )  # fmt: skip
 
 
 def _histories(engine: "Evaluator", case: "Case", alpha: "NDArray[np.float64]", datasets: dict[str, Any]) -> str:

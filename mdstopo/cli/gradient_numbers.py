@@ -1,7 +1,7 @@
 """Comparing gradients: with one another, and with differences."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
-    from mdstopo.evaluation import ErrorEstimate, Evaluation
+    from mdstopo.evaluation import ErrorEstimate, Evaluation, Peak
 
 Floats = NDArray[np.float64]
 Objectives = Callable[[Floats], Mapping[str, float]]
@@ -99,9 +99,7 @@ def differences(
 def _one(objectives: Objectives, alpha: Floats, member: int, size: float | None) -> dict[str, float]:
     here = float(alpha[member])
     central = here > 0.0
-    step = _STEP * (float(alpha.max(initial=0.0)) if size is None else size) or _STEP
-    if central:
-        step = min(step, 0.5 * here)
+    step = _step(alpha, member, size)
     # The error of a central difference has even powers of the step only.
     powers = [2.0 * (level + 1) if central else level + 1.0 for level in range(_LEVELS)]
     base = None if central else objectives(alpha)
@@ -119,6 +117,29 @@ def _one(objectives: Objectives, alpha: Floats, member: int, size: float | None)
             for coarser, finer in pairwise(table)
         ]
     return table[0]
+
+
+def _step(alpha: Floats, member: int, size: float | None) -> float:
+    """The longest step of a difference by one member."""
+    step = _STEP * (float(alpha.max(initial=0.0)) if size is None else size) or _STEP
+    here = float(alpha[member])
+    return min(step, 0.5 * here) if here > 0.0 else step
+
+
+def changes_peak(peaks: "Sequence[Peak]", alpha: Floats, members: NDArray[np.intp], size: float) -> bool:
+    """Whether a step of `differences` by one of the members makes another peak decisive than the first one.
+
+    peaks: those that compete, the decisive one first, with gradients. size: as of `differences`.
+    """
+    steps = np.array([_step(alpha, int(member), size) for member in members])
+    first = peaks[0]
+    for other in peaks[1:]:
+        if first.gradient is None or other.gradient is None:
+            continue
+        reach = np.abs(other.gradient - first.gradient)[members] * steps
+        if reach.max(initial=0.0) > abs(first.value - other.value):
+            return True
+    return False
 
 
 def _moved(alpha: Floats, member: int, value: float) -> Floats:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from mdstopo.case.reader import read_case
 from mdstopo.cli.check import _say_frequencies
 from mdstopo.cli.check_numbers import depths, frequencies, material, totals
-from mdstopo.cli.gradient_numbers import chosen_members, differences, disagreement
+from mdstopo.cli.gradient_numbers import changes_peak, chosen_members, differences, disagreement
 from mdstopo.cli.output import Output
+from mdstopo.evaluation import Peak
 
 Floats = NDArray[np.float64]
 
@@ -162,3 +163,15 @@ def test_load_cases_with_the_same_frequencies_and_duration_are_said_once() -> No
         "load case long, times the duration 2 s",
     ]
     assert [table[1] for table in heard.tables] == [["initial", "2", "2"], ["initial", "3", "3"], ["initial", "2", "4"]]
+
+
+def test_a_step_of_differences_that_makes_another_peak_decisive_is_known():
+    def peak(value, *gradient):
+        return Peak(0.1, value, np.array(gradient))
+
+    alpha, members = np.array([0.5, 0.5]), np.array([1])
+    first = peak(2.0, 3.0, -1.0)
+    assert changes_peak([first, peak(2.0 - 1e-4, 3.0, -2.0)], alpha, members, 0.5)  # 1e-3 in a step of 1e-3
+    assert not changes_peak([first, peak(2.0 - 2e-3, 3.0, -2.0)], alpha, members, 0.5)
+    assert not changes_peak([first, peak(2.0 - 1e-4, 30.0, -1.0)], alpha, members, 0.5)  # by a member not taken
+    assert not changes_peak([first], alpha, members, 0.5)
