@@ -156,6 +156,15 @@ def test_every_kind_of_place_is_differentiated(jointed: bool) -> None:
     check(case_of(text, tolerance=1e-11), 1e-6)
 
 
+def test_points_move_beside_names_that_masses_and_other_points_follow_from() -> None:
+    text = SCENE.replace(
+        "  q: {body: ground,",
+        "  r: {body: ground, grid: {list: [[-1, 1]]}, movable: {within: {around: 0.1}}}\n  q: {body: ground,",
+    )
+    text = text.replace("s: {from: {body: ground, at: [-0.6, 0.5]}", "s: {from: r")
+    check(case_of(text, tolerance=1e-11), 1e-6)
+
+
 def test_a_name_may_be_used_in_the_loads_of_two_load_cases() -> None:
     text = SPRINGS.replace("VARIABLES", "k: {of: define.k, lower: 10, upper: 100}").replace(
         "X: {", "X: {load_case: b, "
