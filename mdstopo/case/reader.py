@@ -189,11 +189,11 @@ def _parsed(text: str, reading: Reading, file: str) -> Node:
 
 
 def _build(
-    top: Fields, root: Node, written: Node, geometry: Geometry, designed: bool, reading: Reading
+    top: Fields, root: Node, written: Node, geometry: Geometry, varies: bool, reading: Reading
 ) -> dict[str, Any]:
     """The parts of the case, as far as they can be made; notes every mistake on the way.
 
-    written: the whole case with its expressions, which are numbers in root. designed: whether what varies is read.
+    written: the whole case with its expressions, which are numbers in root. varies: whether what varies is read.
     """
     declare_joints(top["joints"], reading)
     _check_references(top, reading)
@@ -208,7 +208,7 @@ def _build(
     groups = designed if complete or top["members"] is None else None
     motions = {case: build_motions(by_body, geometry) for case, by_body in by_case.items()}
     variables, follows = build_variables(top, groups, written, reading)
-    movable, coordinates = build_movable(top, points, groups, frames, reading) if designed else ((), ())
+    movable, coordinates = build_movable(top, points, groups, frames, reading) if varies else ((), ())
     variables += coordinates
     warn_assemble(top, reading)
     load_cases = build_load_cases(top, times, motions, starts, frames, reading)
