@@ -85,6 +85,17 @@ def test_paths_go_where_their_commands_say() -> None:
     assert path_points("M-1.5.5L1e1-2") == [(-1.5, 0.5), (10, -2)]
 
 
+def test_flags_of_an_arc_need_nothing_behind_them() -> None:
+    spaced = path_points("M 0 0 A 10 10 0 0 1 10 20 a 5 5 0 1 0 -.5 2 5 5 30 0 0 1 1")
+    assert spaced == [(0, 0), (10, 20), (9.5, 22), (10.5, 23)]
+    assert path_points("M0 0A10 10 0 0110 20a5 5 0 10-.5 2 5 5 30 001 1") == spaced
+
+
+@pytest.mark.parametrize(("number", "metres"), [(3, 1609.344), (10, 0.9144), (13, 1e-6), (21, 1200 / 3937)])
+def test_all_units_of_dxf_are_known(number: int, metres: float) -> None:
+    assert points_in(Path("a.dxf"), DXF.replace("$INSUNITS\n70\n4", f"$INSUNITS\n70\n{number}"))[1] == metres
+
+
 def test_tables_are_points_with_names_or_without() -> None:
     assert points_in(Path("rim.csv"), "x,y\n1,2\n3,4\n3,4\n")[0] == {"rim": [(1, 2), (3, 4)]}
     assert points_in(Path("a.csv"), "a;1;2;3\nb;4;5;6\n")[0] == {"a": [(1, 2, 3)], "b": [(4, 5, 6)]}
@@ -100,6 +111,9 @@ def test_tables_are_points_with_names_or_without() -> None:
         ("a.svg", "<svg", "this is no SVG"),
         ("a.svg", '<svg><g id="k" transform="scale(2)"><line/></g></svg>', "'k' has a transform"),
         ("a.png", "", "points are read from .csv"),
+        ("a.dxf", DXF.replace("$INSUNITS\n70\n4", "$INSUNITS\n70\n99"), "unit is number 99"),
+        ("a.dxf", DXF.replace("\n100\n", "\nx\n"), "could not convert"),
+        ("a.svg", SVG.replace('cx="4"', 'cx="4mm"'), "circle 'pin': cx is '4mm', allowed is a number"),
     ],
 )
 def test_what_is_no_drawing_is_refused_with_the_reason(name: str, text: str, words: str) -> None:
