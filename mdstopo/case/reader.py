@@ -141,7 +141,7 @@ class Document:
         geometry = geometry_in(root, reading)
         top = geometry.format.read(root, "", reading)
         assert isinstance(top, Fields)
-        parts = _build(top, root, self._written, geometry, reading)
+        parts = _build(top, root, self._written, geometry, "design" not in without, reading)
         if top["uncertainty"] is not None:
             from mdstopo.case.sections.uncertainty_section import build_uncertainty  # most cases have none
 
@@ -188,10 +188,12 @@ def _parsed(text: str, reading: Reading, file: str) -> Node:
     return root
 
 
-def _build(top: Fields, root: Node, written: Node, geometry: Geometry, reading: Reading) -> dict[str, Any]:
+def _build(
+    top: Fields, root: Node, written: Node, geometry: Geometry, varies: bool, reading: Reading
+) -> dict[str, Any]:
     """The parts of the case, as far as they can be made; notes every mistake on the way.
 
-    written: the whole case with its expressions, which are numbers in root.
+    written: the whole case with its expressions, which are numbers in root. varies: whether what varies is read.
     """
     declare_joints(top["joints"], reading)
     _check_references(top, reading)
@@ -206,7 +208,7 @@ def _build(top: Fields, root: Node, written: Node, geometry: Geometry, reading: 
     groups = designed if complete or top["members"] is None else None
     motions = {case: build_motions(by_body, geometry) for case, by_body in by_case.items()}
     variables, follows = build_variables(top, groups, written, reading)
-    movable, coordinates = build_movable(top, points, groups, frames, reading)
+    movable, coordinates = build_movable(top, points, groups, frames, reading) if varies else ((), ())
     variables += coordinates
     warn_assemble(top, reading)
     load_cases = build_load_cases(top, times, motions, starts, frames, reading)

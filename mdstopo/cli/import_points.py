@@ -6,17 +6,23 @@ import math
 import re
 import xml.etree.ElementTree as Xml
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 Point = tuple[float, ...]
 Layers = dict[str, list[Point]]
 
-#: metres in the units of a DXF file's header ($INSUNITS); 0: it does not say
-DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 14: 0.1}
+#: metres in the units of a DXF file's header ($INSUNITS); 0: it does not say; from 21 on those of the US survey
+DXF_UNITS = {
+    1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 11: 1e-10,
+    12: 1e-9, 13: 1e-6, 14: 0.1, 15: 10.0, 16: 100.0, 17: 1e9, 21: 1200 / 3937, 22: 100 / 3937, 23: 3600 / 3937,
+    24: 6336000 / 3937,
+}  # fmt: skip
 #: SVG commands of a path and how many numbers each takes; the last two are where it ends
 SVG_COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+#: an arc of a path: its two flags are one digit each, which the next number may follow at once
+_ARC = r"[\s,]*".join(f"({each})" for each in (*[_NUMBER] * 3, "[01]", "[01]", *[_NUMBER] * 2))
 
 
 class ImportedError(ValueError):
@@ -77,14 +83,30 @@ def _dxf(data: str, path: Path) -> tuple[Layers, float | None]:
         pairs = [(int(code), value) for code, value in zip(lines[::2], lines[1::2], strict=False)]
     except ValueError as error:
         raise ImportedError(f"{path}: this is no DXF: {error}") from None
+    try:
+        return _dxf_layers(pairs), _dxf_unit(pairs, path)
+    except ValueError as error:
+        raise ImportedError(str(error) if isinstance(error, ImportedError) else f"{path}: {error}") from None
+
+
+def _dxf_layers(pairs: list[tuple[int, str]]) -> Layers:
     layers: Layers = {}
     for kind, fields in _entities(pairs):
         xs = [float(value) for code, value in fields if code in (10, 11) and (code == 10 or kind == "LINE")]
         ys = [float(value) for code, value in fields if code in (20, 21) and (code == 20 or kind == "LINE")]
         layer = next((value for code, value in fields if code == 8), "0")
         layers.setdefault(layer, []).extend(zip(xs, ys, strict=False))
-    units = [value for (code, name), (_, value) in pairwise(pairs) if (code, name) == (9, "$INSUNITS")]
-    return layers, DXF_UNITS.get(int(units[0])) if units else None
+    return layers
+
+
+def _dxf_unit(pairs: list[tuple[int, str]], path: Path) -> float | None:
+    """Metres in the file's unit, None where it does not say."""
+    unit = next((int(value) for (code, name), (_, value) in pairwise(pairs) if (code, name) == (9, "$INSUNITS")), 0)
+    if unit and unit not in DXF_UNITS:
+        raise ImportedError(
+            f"{path}: its unit is number {unit} of DXF, which is not known here; save it in another one"
+        )
+    return DXF_UNITS.get(unit)
 
 
 def _entities(pairs: list[tuple[int, str]]) -> Iterator[tuple[str, list[tuple[int, str]]]]:
@@ -127,15 +149,20 @@ def _svg_node(node: Xml.Element, name: str, layers: Layers, path: Path) -> None:
         raise ImportedError(f"{path}: {kind} {name!r} has a transform, which is not read; ungroup or flatten it first")
     if kind in ("defs", "clipPath", "mask", "symbol"):
         return
-    layers.setdefault(name, []).extend(_svg_points(kind, node))
+    try:
+        layers.setdefault(name, []).extend(_svg_points(kind, node))
+    except ValueError as error:
+        raise ImportedError(f"{path}: {kind} {name!r}: {error}") from None
     for child in node:
         _svg_node(child, name, layers, path)
 
 
 def _svg_points(kind: str, node: Xml.Element) -> list[Point]:
     def number(key: str) -> float:
-        found = re.match(_NUMBER, node.get(key, "0"))
-        return float(found[0]) if found else 0.0
+        stated = node.get(key, "0").strip().removesuffix("px")
+        if not re.fullmatch(_NUMBER, stated):
+            raise ValueError(f"{key} is {stated!r}, allowed is a number of the drawing's units")
+        return float(stated)
 
     if kind in ("polygon", "polyline"):
         values = [float(each) for each in re.findall(_NUMBER, node.get("points", ""))]
@@ -155,7 +182,9 @@ def path_points(text: str) -> list[Point]:
     found: list[Point] = []
     x = y = x0 = y0 = 0.0
     for command, rest in re.findall(r"([MLHVCSQTAZmlhvcsqtaz])([^MLHVCSQTAZmlhvcsqtaz]*)", text):
-        letter, values = command.upper(), [float(each) for each in re.findall(_NUMBER, rest)]
+        letter = command.upper()
+        stated = chain.from_iterable(re.findall(_ARC, rest)) if letter == "A" else re.findall(_NUMBER, rest)
+        values = [float(each) for each in stated]
         count = SVG_COMMANDS[letter]
         if letter == "Z":
             x, y = x0, y0

@@ -3,7 +3,7 @@
 import math
 import re
 import xml.etree.ElementTree as Xml
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,13 @@ Plain = dict[str, Any]
 DENSITY = 1000.0
 _JOINTS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 _MJCF = {"hinge": "revolute", "slide": "prismatic", "ball": "spherical"}
+#: what may stand in a body of MJCF, of which some says nothing about masses; other elements may hold bodies or shapes
+_IN_BODY = ("body", "inertial", "joint", "freejoint", "geom", "site", "camera", "light")
+#: settings of MuJoCo's compiler that change masses, each with the values that do not
+_MASSES_AS_STATED = {
+    "settotalmass": ("-1",), "boundmass": ("0",), "boundinertia": ("0",), "balanceinertia": ("false",),
+    "inertiafromgeom": ("auto", "false"), "inertiagrouprange": ("0 5",),
+}  # fmt: skip
 
 
 @dataclass
@@ -64,6 +71,13 @@ class Tree:
     bodies: dict[str, Part] = field(default_factory=dict)
     joints: list[Plain] = field(default_factory=list)
     told: list[str] = field(default_factory=list)
+    gravity: list[float] = field(default_factory=lambda: [0.0, 0.0, -9.81])
+
+    def add(self, name: str, part: Part) -> None:
+        """Take in a body of a name that no other one has."""
+        if name in self.bodies:
+            raise ValueError(f"two bodies have the name {name!r} in a case; give one of them another")
+        self.bodies[name] = part
 
     def tell(self, sentence: str) -> None:
         """Note a remark for the user, once."""
@@ -83,7 +97,12 @@ def robot_in(path: Path, data: str, fixed: bool = False) -> tuple[Plain, list[st
     readers: dict[str, Callable[[Xml.Element, Path, bool], Tree]] = {"robot": _urdf, "mujoco": _mjcf}
     if root.tag not in readers:
         raise ImportedError(f"{path}: found <{root.tag}>, allowed is <robot> (URDF) or <mujoco> (MJCF)")
-    tree = readers[root.tag](root, path, fixed)
+    try:
+        tree = readers[root.tag](root, path, fixed)
+    except ImportedError:
+        raise
+    except ValueError as error:
+        raise ImportedError(f"{path}: {error}") from None
     if not tree.bodies:
         raise ImportedError(f"{path}: no body in it has a mass")
     for name, part in tree.bodies.items():
@@ -93,7 +112,7 @@ def robot_in(path: Path, data: str, fixed: bool = False) -> tuple[Plain, list[st
         "format": 1,
         "title": root.get("name") or root.get("model") or path.stem,
         "dimension": 3,
-        "gravity": [0, 0, -9.81],
+        "gravity": tree.gravity,
         "time": {"end": 1},
         "bodies": {name: _body(part) for name, part in tree.bodies.items()},
     }
@@ -118,17 +137,25 @@ def as_name(text: str) -> str:
     return word if re.match(r"[A-Za-z_]", word) and word not in ("ground", "all", "default") else f"_{word}"
 
 
-def _vector(text: str | None, default: str) -> Floats:
-    return np.array([float(each) for each in (text or default).split()])
+def _vector(text: str | None, default: str, count: int | None = 3) -> Floats:
+    """Numbers between blanks; count: how many there have to be, None for any. Raises ValueError."""
+    stated = text or default
+    try:
+        values = np.array([float(each) for each in stated.split()])
+    except ValueError:
+        raise ValueError(f"found {stated!r}, allowed are numbers") from None
+    if count not in (None, len(values)):
+        raise ValueError(f"found {stated!r}, allowed are {count} numbers")
+    return values
 
 
-def _euler(angles: Floats, order: str = "xyz", moving: bool = False) -> Floats:
-    """Turns about axes by the letters in `order`; moving: each about the axes that the ones before have turned."""
+def _euler(angles: Floats, order: str) -> Floats:
+    """Turns about axes by the letters in `order`: small ones about axes that the turns before have turned."""
     turn = np.eye(3)
-    for angle, letter in zip(angles.tolist(), order.lower(), strict=True):
-        axis = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]["xyz".index(letter)]
+    for angle, letter in zip(angles.tolist(), order, strict=True):
+        axis = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]["xyz".index(letter.lower())]
         own = about_axis(axis, angle)
-        turn = turn @ own if moving else own @ turn
+        turn = turn @ own if letter.islower() else own @ turn
     return turn
 
 
@@ -168,7 +195,7 @@ def _ends(joint: Xml.Element, which: str, links: dict[str, Xml.Element], path: P
 def _origin(node: Xml.Element | None) -> Frame:
     if node is None:
         return Frame()
-    return Frame(_vector(node.get("xyz"), "0 0 0"), _euler(_vector(node.get("rpy"), "0 0 0")))
+    return Frame(_vector(node.get("xyz"), "0 0 0"), _euler(_vector(node.get("rpy"), "0 0 0"), "XYZ"))
 
 
 @dataclass
@@ -200,7 +227,7 @@ class _Urdf:
         part = self.part(name, at)
         if body is None:
             body = as_name(name)
-            self.tree.bodies[body] = part
+            self.tree.add(body, part)
         elif body != "ground":
             self.tree.bodies[body] = self.tree.bodies[body] + part
         for joint in self.joints.get(name, ()):
@@ -239,18 +266,33 @@ def _mjcf(root: Xml.Element, path: Path, fixed: bool) -> Tree:
     if world is None:
         raise ImportedError(f"{path}: there is no <worldbody>")
     tree = Tree()
+    _refuse_what_changes_masses(root, settings, path)
+    if (option := root.find("option")) is not None:
+        tree.gravity = _vector(option.get("gravity"), "0 0 -9.81").tolist()
     for each in ("default", "tendon", "actuator", "equality", "contact", "sensor"):
         if root.find(each) is not None:
             tree.tell(f"<{each}> is left out")
-    if root.find("default") is not None and root.find("default//geom") is not None:
-        raise ImportedError(f"{path}: defaults of geoms are not read; write densities and masses where they are used")
     walk = _Mjcf(tree, path, settings.get("angle", "degree") == "degree", settings.get("eulerseq", "xyz"))
+    walk.refuse_others(world)
     for body in world.findall("body"):
         walk.body(body, Frame(), "ground")
     if fixed and not tree.joints and tree.bodies:
         name = next(iter(tree.bodies))
         tree.joints.append({"type": "fixed", "bodies": ["ground", name], "at": _plain(tree.bodies[name].centre)})
     return tree
+
+
+def _refuse_what_changes_masses(root: Xml.Element, settings: Mapping[str, str], path: Path) -> None:
+    """Refuse what is not read here and makes other bodies, masses or joints of those that are (ImportedError)."""
+    if root.find(".//include") is not None:
+        raise ImportedError(f"{path}: <include> is not read; put its contents in its place")
+    if root.find("default//geom") is not None:
+        raise ImportedError(f"{path}: defaults of geoms are not read; write densities and masses where they are used")
+    if any(joint.get(key) for joint in root.iterfind("default//joint") for key in ("type", "pos", "axis")):
+        raise ImportedError(f"{path}: defaults of joints are not read; write type, pos and axis where they are used")
+    for key, usual in _MASSES_AS_STATED.items():
+        if settings.get(key, usual[0]) not in usual:
+            raise ImportedError(f"{path}: the compiler's {key} is not read; state the masses that it makes")
 
 
 @dataclass
@@ -266,13 +308,13 @@ class _Mjcf:
         """Where a body, an inertial or a geom is in what it belongs to."""
         place = _vector(node.get("pos"), "0 0 0")
         if node.get("quat"):
-            w, x, y, z = (_vector(node.get("quat"), "") / np.linalg.norm(_vector(node.get("quat"), ""))).tolist()
+            w, x, y, z = _vector(node.get("quat"), "", 4).tolist()
             angle, axis = 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w), np.array([x, y, z])
             return Frame(place, about_axis(tuple(axis.tolist()), angle) if axis.any() else np.eye(3))
         if node.get("euler"):
-            return Frame(place, _euler(self.angle(_vector(node.get("euler"), "")), self.order, self.order.islower()))
+            return Frame(place, _euler(self.angle(_vector(node.get("euler"), "")), self.order))
         if node.get("axisangle"):
-            *line, angle = _vector(node.get("axisangle"), "").tolist()
+            *line, angle = _vector(node.get("axisangle"), "", 4).tolist()
             return Frame(place, about_axis(tuple(line), float(self.angle(np.array([angle]))[0])))
         if node.get("xyaxes") or node.get("zaxis"):
             raise ImportedError(f"{self.path}: {node.tag} {node.get('name', '')!r}: xyaxes and zaxis are not read")
@@ -282,9 +324,16 @@ class _Mjcf:
         """Angles in rad."""
         return np.deg2rad(values) if self.degrees else values
 
+    def refuse_others(self, node: Xml.Element) -> None:
+        """Refuse what may hold bodies or shapes and is not read (ImportedError)."""
+        for child in node:
+            if isinstance(child.tag, str) and child.tag not in _IN_BODY:
+                raise ImportedError(f"{self.path}: <{child.tag}> in {node.get('name') or node.tag!r} is not read")
+
     def body(self, node: Xml.Element, around: Frame, parent: str) -> None:
         """Take in a body, its joint, and the bodies in it."""
         at = around @ self.frame(node)
+        self.refuse_others(node)
         name = as_name(node.get("name") or f"body_{len(self.tree.bodies)}")
         part, joints = self.part(node, at), [*node.findall("joint"), *node.findall("freejoint")]
         if not joints:  # it is a part of what it stands in
@@ -292,7 +341,7 @@ class _Mjcf:
             if parent != "ground":
                 self.tree.bodies[parent] = self.tree.bodies[parent] + part
         else:
-            self.tree.bodies[name] = part
+            self.tree.add(name, part)
             self.joint(joints, at, parent, name)
         for child in node.findall("body"):
             self.body(child, at, name)
@@ -323,7 +372,7 @@ class _Mjcf:
         if inertial is not None:
             own = at @ self.frame(inertial)
             if inertial.get("fullinertia"):
-                xx, yy, zz, xy, xz, yz = _vector(inertial.get("fullinertia"), "").tolist()
+                xx, yy, zz, xy, xz, yz = _vector(inertial.get("fullinertia"), "", 6).tolist()
                 tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             else:
                 tensor = np.diag(_vector(inertial.get("diaginertia"), "0 0 0"))
@@ -332,13 +381,16 @@ class _Mjcf:
 
     def geom(self, node: Xml.Element, at: Frame) -> Part:
         """The mass of a homogeneous sphere, box, cylinder, capsule or ellipsoid."""
-        kind, size = node.get("type", "sphere"), _vector(node.get("size"), "0 0 0")
+        kind, size = node.get("type", "sphere"), _vector(node.get("size"), "0 0 0", None)
+        if node.get("shellinertia", "false") != "false":
+            raise ImportedError(f"{self.path}: geom {node.get('name', '')!r}: shells are not read; state an <inertial>")
         own = at @ self.frame(node)
         if node.get("fromto"):
-            ends = _vector(node.get("fromto"), "").reshape(2, 3)
+            ends = _vector(node.get("fromto"), "", 6).reshape(2, 3)
             line = ends[1] - ends[0]
             own = at @ Frame(ends.mean(axis=0), _along(line))
-            size = np.array([size[0], 0.5 * float(np.linalg.norm(line))])
+            across = [size[0]] * (2 if kind in ("box", "ellipsoid") else 1)
+            size = np.array([*across, 0.5 * float(np.linalg.norm(line))])
         if kind not in ("sphere", "box", "cylinder", "capsule", "ellipsoid"):
             raise ImportedError(
                 f"{self.path}: geom of type {kind!r} has no mass that is known here; state an <inertial>"

@@ -16,6 +16,7 @@ from mdstopo.case.arrays import FloatArray, Signal, Table, TimeFormula
 from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.joints.joints_in_space import SPATIAL_JOINTS
+from mdstopo.case.keys.definitions import SECTION
 from mdstopo.case.keys.number_rows import Signals
 from mdstopo.case.keys.signals import UnaddedSignalsError, combined
 from mdstopo.case.methods.over_time import DEFAULT_REDUCTION, REDUCTIONS
@@ -55,6 +56,8 @@ class _Lift:
             self.refuse("dimension", "is 3: the case is in space already")
             self.tell()
         old = content_of(self.case)
+        self.names(old)
+        self.tell()
         new: Plain = {"format": old.pop("format"), "dimension": 3}
         for key, value in old.items():
             if key not in ("dimension", "fit") and value is not None:
@@ -70,6 +73,22 @@ class _Lift:
             marks = self.case.marks
             mistakes = [marks.mistake(path, f"{words}: it cannot be lifted") for path, words in self.refused]
             raise CaseError(mistakes, str(self.case.path or "<text>"))
+
+    def names(self, old: Plain) -> None:
+        """Refuse names that vary where numbers that follow from them would be none, or several added up, in space."""
+        if self.case.follows is None:
+            return
+        if SECTION not in old:
+            words = "varies, and is no name any more where points follow from one or members have values of their own"
+            for each in self.case.defined_variables:
+                self.refuse(f"design.variables.{each.name}.of", words)
+            return
+        for number in self.case.follows.of_kind("scene"):
+            is_scalar = number.key.endswith((".mass", ".inertia"))
+            if ".loads[" in f".{number.key}":
+                self.refuse(number.key, "follows from a name that varies, and a load in space is read as numbers")
+            elif self.is_tilted and not is_scalar:
+                self.refuse(number.key, "follows from a name that varies, and in a tilted plane is no single number")
 
     def sections(self) -> dict[str, Callable[[Any, str], Any]]:
         """What becomes of the value of a key; of others nothing does."""
@@ -223,17 +242,19 @@ class _Lift:
 
     def points(self, old: Plain, path: str) -> Plain:
         """The grids in the plane."""
-        del path
         frame, grid = _frame(old), old["grid"]
         lift = self.grid
         new = {**old, "grid": [lift(each, frame) for each in grid] if isinstance(grid, list) else lift(grid, frame)}
         if old.get("movable") is not None:
-            new["movable"] = {"within": self.region(old["movable"]["within"], frame)}
+            new["movable"] = {"within": self.region(old["movable"]["within"], frame, f"{path}.movable.within")}
         return new
 
-    def region(self, old: Plain, frame: str) -> Plain:
+    def region(self, old: Plain, frame: str, path: str) -> Plain:
         """Where points may move: a line or a rectangle of the plane."""
         ((kind, keys),) = old.items()
+        if kind == "around":
+            self.refuse(inside(path, kind), "in space points that may move around where they are leave the plane")
+            return old
         if kind == "line":
             return {kind: {end: self.vector(keys[end], frame) for end in ("from", "to")}}
         axes = [self.vector([1, 0], frame), self.vector([0, 1], frame)]

@@ -104,14 +104,14 @@ class MeanAndDeviation(Mean):
     def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
         """The measure of values y (S,) at points with probabilities p; see `Statistic.value`."""
         mean = super().value(measure, y, p)
-        return mean + measure.factor * _deviation(y, p, mean)
+        return mean + measure.factor * _deviation(y, p, _apart(y, p))
 
     def slopes(self, measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
         """(S,) the derivatives of the measure by the values y; those of the mean where all values are the same."""
-        mean = super().value(measure, y, p)
-        deviation = _deviation(y, p, mean)
+        apart = _apart(y, p)
+        deviation = _deviation(y, p, apart)
         if deviation > 0.0:
-            return np.asarray(p * (1.0 + measure.factor * (y - mean) / deviation))
+            return np.asarray(p * (1.0 + measure.factor * apart / deviation))
         return super().slopes(measure, y, p)
 
     def influences(self, measure: Measure, y: FloatArray, mean: float) -> tuple[float, FloatArray]:
@@ -227,9 +227,16 @@ def _choices(parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> lis
     return list(found)
 
 
-def _deviation(y: FloatArray, p: FloatArray, mean: float) -> float:
+def _apart(y: FloatArray, p: FloatArray) -> FloatArray:
+    """(S,) by how much values exceed their mean, with a mean of zero to rounding of these, not of the values: slopes by
+    nearly equal values would else not add up to 1."""
+    apart = y - (p * y).sum()
+    return np.asarray(apart - (p * apart).sum())
+
+
+def _deviation(y: FloatArray, p: FloatArray, apart: FloatArray) -> float:
     """The standard deviation; exactly 0 where values differ by rounding alone, so that it has no slope."""
-    deviation = float(np.sqrt((p * (y - mean) ** 2).sum()))
+    deviation = float(np.sqrt((p * apart**2).sum()))
     return deviation if deviation > _NONE * float(np.abs(y).max()) else 0.0
 
 

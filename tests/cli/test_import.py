@@ -85,6 +85,17 @@ def test_paths_go_where_their_commands_say() -> None:
     assert path_points("M-1.5.5L1e1-2") == [(-1.5, 0.5), (10, -2)]
 
 
+def test_flags_of_an_arc_need_nothing_behind_them() -> None:
+    spaced = path_points("M 0 0 A 10 10 0 0 1 10 20 a 5 5 0 1 0 -.5 2 5 5 30 0 0 1 1")
+    assert spaced == [(0, 0), (10, 20), (9.5, 22), (10.5, 23)]
+    assert path_points("M0 0A10 10 0 0110 20a5 5 0 10-.5 2 5 5 30 001 1") == spaced
+
+
+@pytest.mark.parametrize(("number", "metres"), [(3, 1609.344), (10, 0.9144), (13, 1e-6), (21, 1200 / 3937)])
+def test_all_units_of_dxf_are_known(number: int, metres: float) -> None:
+    assert points_in(Path("a.dxf"), DXF.replace("$INSUNITS\n70\n4", f"$INSUNITS\n70\n{number}"))[1] == metres
+
+
 def test_tables_are_points_with_names_or_without() -> None:
     assert points_in(Path("rim.csv"), "x,y\n1,2\n3,4\n3,4\n")[0] == {"rim": [(1, 2), (3, 4)]}
     assert points_in(Path("a.csv"), "a;1;2;3\nb;4;5;6\n")[0] == {"a": [(1, 2, 3)], "b": [(4, 5, 6)]}
@@ -100,6 +111,9 @@ def test_tables_are_points_with_names_or_without() -> None:
         ("a.svg", "<svg", "this is no SVG"),
         ("a.svg", '<svg><g id="k" transform="scale(2)"><line/></g></svg>', "'k' has a transform"),
         ("a.png", "", "points are read from .csv"),
+        ("a.dxf", DXF.replace("$INSUNITS\n70\n4", "$INSUNITS\n70\n99"), "unit is number 99"),
+        ("a.dxf", DXF.replace("\n100\n", "\nx\n"), "could not convert"),
+        ("a.svg", SVG.replace('cx="4"', 'cx="4mm"'), "circle 'pin': cx is '4mm', allowed is a number"),
     ],
 )
 def test_what_is_no_drawing_is_refused_with_the_reason(name: str, text: str, words: str) -> None:
@@ -195,11 +209,46 @@ def test_the_first_body_is_held_on_request() -> None:
         (ARM.replace('<mass value="3"/>', '<mass value="0"/>'), "'lower' has no mass"),
         (MJCF.replace("<freejoint/>", '<joint/><joint type="slide"/>'), "has 2 joints"),
         (MJCF.replace('type="capsule"', 'type="mesh"'), "state an <inertial>"),
+        (MJCF.replace("<freejoint/>", '<freejoint/><frame pos="0 0 1"/>'), "<frame> in 'ball' is not read"),
+        (MJCF.replace("<worldbody>", "<worldbody><replicate/>"), "<replicate> in 'worldbody' is not read"),
+        (MJCF.replace("<worldbody>", '<include file="more.xml"/><worldbody>'), "<include> is not read"),
+        (MJCF.replace("<worldbody>", '<compiler settotalmass="9"/><worldbody>'), "settotalmass is not read"),
+        (MJCF.replace("<worldbody>", '<default><joint axis="0 1 0"/></default><worldbody>'), "defaults of joints"),
+        (MJCF.replace('size="0.3"', 'size="0.3" shellinertia="true"'), "shells are not read"),
+        (MJCF.replace('name="ball"', 'name="pole"'), "two bodies have the name 'pole'"),
+        (MJCF.replace('pos="1 0 0"', 'pos="1 0"'), "found '1 0', allowed are 3 numbers"),
+        (ARM.replace('xyz="0.2 0 0"', 'xyz="${far} 0 0"'), "'[$]{far} 0 0', allowed are numbers"),
+        (
+            ARM.replace('"weight"', '"upper arm"')
+            .replace("upper-arm", "upper_arm")
+            .replace('"glue" type="fixed"', '"glue" type="floating"'),
+            "two bodies have the name 'upper_arm'",
+        ),
     ],
 )
 def test_robots_that_no_case_can_say_are_refused_by_name(text: str, words: str) -> None:
     with pytest.raises(ImportedError, match=words):
         robot_in(Path("a.urdf"), text)
+
+
+def test_a_box_between_two_points_is_square_across() -> None:
+    geom = '<geom type="box" fromto="0 0 0 0 0.6 0" size="0.1" density="500"/>'
+    text = f'<mujoco><worldbody><body name="a"><freejoint/>{geom}</body></worldbody></mujoco>'
+    (body,) = case_of(text, "a.xml")[0].bodies
+    assert body.mass == pytest.approx(500 * 0.2 * 0.2 * 0.6, rel=1e-14)
+    across, along = 0.2**2 + 0.6**2, 2 * 0.2**2
+    assert body.inertia == pytest.approx(body.mass / 12 * np.diag([across, along, across]), abs=1e-15)
+
+
+def test_turns_of_mjcf_are_about_fixed_axes_for_capitals_letter_by_letter() -> None:
+    axis = '<joint type="hinge" axis="0 0 1"/>'
+    text = f"""<mujoco><compiler eulerseq="zXy"/><option gravity="1 2 -3"/>
+      <worldbody><body name="a" euler="90 30 50">{axis}<geom size="0.1"/></body></worldbody></mujoco>"""
+    content, _ = robot_in(Path("a.xml"), text)
+    # its own y leans z by 50 degrees along x, z makes that y, and the fixed x turns back by 30
+    lean = math.radians(50 - 30)
+    assert content["joints"][0]["axis"] == pytest.approx([0.0, math.sin(lean), math.cos(lean)], abs=1e-15)
+    assert content["gravity"] == [1.0, 2.0, -3.0]
 
 
 def test_masses_are_those_of_mujoco() -> None:

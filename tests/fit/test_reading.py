@@ -98,6 +98,16 @@ def test_a_table_is_read_with_its_columns_scales_and_window(folder: Path) -> Non
     np.testing.assert_allclose(found.deviation, [0.001, 0.002, 0.002, 0.001])
 
 
+def test_rows_at_the_ends_of_a_window_are_in_it_whatever_scales_make_of_their_times(folder: Path) -> None:
+    (folder / "height.csv").write_text("".join(f"{t},0\n" for t in range(500)), "utf-8")
+    above = [t for t in range(1, 500) if t * 0.001 > t / 1000]
+    assert len(above) > 5
+    for t in above:
+        window = {"time": 0, "value": 1, "time_scale": 0.001, "from": 0, "to": t / 1000}
+        case = load_case(folder / "drop.yaml", {f"fit.measured.height.{key}": value for key, value in window.items()})
+        assert len(read_measured(case)[0].t) == t + 1
+
+
 @pytest.mark.parametrize(
     ("table", "overrides", "told"),
     [

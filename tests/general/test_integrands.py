@@ -428,6 +428,27 @@ def test_what_joints_hold_at_zero_takes_no_more_steps():
     assert found.work["steps"] == evaluate(read_case(only)).work["steps"]
 
 
+@pytest.mark.parametrize("over_time", ["mean", "rms"])
+def test_a_member_whose_length_joints_hold_has_no_force_on_average(over_time):
+    """Between states it has one, by how much joints are missed there: no step can be halved until that is smooth."""
+    member = "  t: {from: {body: a, at: [0.3, 0.4]}, to: {body: b, at: [0.9, 0]}, law: {type: spring, stiffness: 90}}\n"
+    text = HELD.replace(
+        "position: [0.2, 0.1]}", "position: [0.2, 0.1]}, b: {mass: 1, inertia: 0.2, position: [0.8, 0.2]}"
+    )
+    text = text.replace("joints:\n", "joints:\n  - {type: fixed, bodies: [a, b]}\n").replace(
+        "prismatic, ", "revolute, "
+    )
+    text = text.replace(", axis: [0.53, 0.4]", "").replace("design:", member + "design:")
+    text = text[: text.index("objectives:")]
+    force = evaluate(
+        read_case(f"{text}objectives: {{F: {{response: {{member_force: {{group: t}}}}, over_time: {over_time}}}}}")
+    )
+    place = evaluate(read_case(f"{text}objectives: {{F: {{response: {{angle: {{body: b}}}}, over_time: final}}}}"))
+    assert force.status.ok
+    assert abs(force.objectives["F"]) < 90 * 1e-8
+    assert force.work["steps"] == place.work["steps"]
+
+
 def test_rounding_is_not_halved_on_and_on():
     from mdstopo.general.over_time.quadrature_breakpoints import halves
 

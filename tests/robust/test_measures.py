@@ -46,6 +46,16 @@ def test_slopes_are_those_of_the_measure(measure):
     np.testing.assert_allclose(slopes(measure, y, p), found, atol=1e-8)
 
 
+@pytest.mark.parametrize("apart", [1e-13, 1e-10, 1e-4])
+def test_slopes_by_values_that_hardly_differ_add_up_to_one(apart):
+    """All values one larger make the mean one larger and leave the deviation."""
+    rng = np.random.default_rng(3)
+    p = rng.random(12)
+    p /= p.sum()
+    y = 2.181683206835 * (1.0 + apart * rng.normal(size=12))
+    assert slopes(ALL[1], y, p).sum() == pytest.approx(1.0, abs=1e-14)
+
+
 def test_a_deviation_that_is_none_has_no_slope():
     y = np.full(5, 3.1)
     assert np.isfinite(slopes(ALL[1], y, equal(5))).all()

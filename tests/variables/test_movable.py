@@ -281,6 +281,12 @@ def test_a_lifted_case_has_its_points_in_the_same_regions(axis):
         assert placed(spatial, design[0]).points["wall"].world == pytest.approx(flat @ turn.T, abs=1e-12)
 
 
+def test_points_that_move_around_where_they_are_are_not_lifted():
+    planar = read_case(BEAM.replace("{line: {from: [-1, -1], to: [-1, 1]}}", "{around: 0.1}"))
+    with pytest.raises(CaseError, match=r"points.wall.movable.within.around: .* leave the plane: it cannot be lifted"):
+        lifted(planar)
+
+
 MISTAKES = [
     ("[-1, 0.6]", "[-1.5, 0.6]", "points.wall.movable.within", "point 0 of 'wall' is at [-1.5, 0.6], 0.5 m outside"),
     ("to: [-1, 1]", "to: [-1, -1]", "points.wall.movable.within.line.to", "is where the line begins"),

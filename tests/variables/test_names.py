@@ -14,6 +14,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.finalize_design import finalize, opened, ready
+from mdstopo.finalize.lift_case import lifted
 from mdstopo.robust.ensemble import Ensemble
 from mdstopo.robust.sample import design_sample
 from mdstopo.robust.sampled_case import case_at
@@ -156,6 +157,15 @@ def test_every_kind_of_place_is_differentiated(jointed: bool) -> None:
     check(case_of(text, tolerance=1e-11), 1e-6)
 
 
+def test_points_move_beside_names_that_masses_and_other_points_follow_from() -> None:
+    text = SCENE.replace(
+        "  q: {body: ground,",
+        "  r: {body: ground, grid: {list: [[-1, 1]]}, movable: {within: {around: 0.1}}}\n  q: {body: ground,",
+    )
+    text = text.replace("s: {from: {body: ground, at: [-0.6, 0.5]}", "s: {from: r")
+    check(case_of(text, tolerance=1e-11), 1e-6)
+
+
 def test_a_name_may_be_used_in_the_loads_of_two_load_cases() -> None:
     text = SPRINGS.replace("VARIABLES", "k: {of: define.k, lower: 10, upper: 100}").replace(
         "X: {", "X: {load_case: b, "
@@ -289,6 +299,32 @@ def test_a_final_case_has_the_name_as_one_number(tmp_path) -> None:  # type: ign
     assert done.difference < 1e-9
     harder = read_case(done.text, overrides={"define.k": 1.1 * k})
     assert harder.members[0].laws[0].stiffness == pytest.approx(1.1 * 0.7 * k * done.alpha[0])  # type: ignore[attr-defined]
+
+
+def test_a_lifted_case_keeps_names_that_masses_and_velocities_follow_from() -> None:
+    names = "k: {of: define.k, lower: 10, upper: 100}, h: {of: define.h, lower: 1, upper: 4}"
+    text = SPRINGS.replace("VARIABLES", names).replace("define: {k: 60}", "define: {k: 60, h: 2}")
+    text = text.replace("mass: 2, inertia: 0.3", 'mass: "=h", inertia: "=h/3"').replace("[0.8, 0.3]", '["=h*0.4", 0.3]')
+    spatial = read_case(lifted(read_case(text)))
+    assert spatial.follows is not None
+    there = read_case(lifted(read_case(text)), overrides={"define.h": 3})
+    assert there.bodies[0].mass == 3.0
+    assert np.array_equal(there.bodies[0].inertia, np.eye(3))
+    assert there.bodies[0].velocity == (3 * 0.4, 0.3, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "tilt", "words"),
+    [
+        (SCENE, 0.0, "design.variables.wide.of: varies, and is no name any more"),
+        (SPRINGS + 'loads: [{body: m, force: ["=k", 1]}]\n', 0.0, r"loads\[0\].force\[0\]: follows from a name"),
+        (SPRINGS + 'gravity: ["=k", 1]\n', 0.5, r"gravity\[0\]: follows .* in a tilted plane is no single number"),
+    ],
+)
+def test_names_that_a_lifted_case_could_not_follow_are_refused(text: str, tilt: float, words: str) -> None:
+    planar = read_case(text.replace("VARIABLES", "k: {of: define.k, lower: 10, upper: 100}"))
+    with pytest.raises(CaseError, match=f"{words}.*: it cannot be lifted"):
+        lifted(planar, (1.0, 0.0, 0.0), tilt)
 
 
 def test_other_names_in_the_same_expressions_may_be_uncertain() -> None:

@@ -80,10 +80,11 @@ def _series(case: Case, series: Series, reading: Reading, found: list[Measured])
     read = dict(zip(columns, numbers.T, strict=True))
     t, y = read["time"] * series.time_scale, read["value"] * series.value_scale
     inside_window = np.ones(len(t), dtype=bool)
+    rounded = 2.0 * np.spacing(np.abs(t))  # 2300 times 0.001 is above 2.3
     if series.begin is not None:
-        inside_window &= t >= series.begin
+        inside_window &= t >= series.begin - rounded
     if series.end is not None:
-        inside_window &= t <= series.end
+        inside_window &= t <= series.end + rounded
     lines = np.array(table.lines)[inside_window]
     t, y = t[inside_window], y[inside_window]
     if not len(t):
