@@ -259,7 +259,7 @@ def test_prices_in_space_are_the_gradient_of_candidates_that_are_built(name):
 
 @pytest.mark.parametrize("name", [name for name in SWITCHED if name not in IN_SPACE])
 def test_prices_of_laws_that_switch_come_to_the_gradient_as_steps_become_shorter(name):
-    # of sixth order, until rounding; built, the same members have all steps end at their switches
+    # of fifth order at least, until rounding; built, the same members have all steps end at their switches
     long, short = (Priced(SWITCHED[name], step).error for step in (0.01, 0.0025))
     assert short <= 1e-8
     assert short <= long / 256.0
