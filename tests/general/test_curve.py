@@ -124,6 +124,8 @@ def test_gradients_by_alphas_of_zero_of_many_curves_keep_the_tolerance(method):
     At the smaller tolerance steps end at all knots.
     """
     stored = {name: {"response": "energy", "over_time": name} for name in ("mean", "rms")}
+    stored["pull"] = {"response": {"member_force": {"group": "belts"}}, "over_time": "mean"}
+    stored["push"] = {"response": {"acceleration": {"body": "plate", "at": [0.3, 0.1]}}, "over_time": "mean"}
     alpha = np.zeros(60)
     alpha[[0, 1, 30, 31]] = 0.5
     found = evaluate(hung(60, stored, tolerance=1e-6), alpha, method=method)

@@ -249,7 +249,7 @@ def _fill_shares(when, time, share):
     share (NODES, S): out.
     """
     legendre = np.empty(HIGHEST + 1)
-    degree = degree_of(when.shape[0])
+    degree = degree_of(when.shape[0], time[1], np.max(when) - time[0])
     for j in range(when.shape[0]):
         x = 2.0 * (when[j] - time[0]) / time[1] - 1.0
         legendre[0] = 1.0

@@ -13,6 +13,8 @@ from mdstopo.mechanics.laws.law_table import law, law_has_pieces, law_is_idle, l
 
 #: the highest power of time that virtual changes within a step have, and stages from which on they have it
 HIGHEST, MANY = 3, 8
+#: a step has cubes of time among these, and squares, from this part of the time on over which its stages lie
+CUBES_FROM, SQUARES_FROM = 0.5, 0.1
 #: Legendre's polynomials at the nodes by degree, each times what its moment over a step counts
 AT_NODES = np.polynomial.legendre.legvander(2.0 * NODE - 1.0, HIGHEST) * (2.0 * np.arange(HIGHEST + 1) + 1.0)
 #: points and weights of an integral over a piece of a step, as fractions of it (Gauss)
@@ -36,9 +38,19 @@ ROUNDING = 4e-15
 
 
 @part
-def degree_of(stages):
-    """Of which degree the virtual changes are within a step of so many stages."""
-    return HIGHEST if stages >= MANY else min(stages - 1, HIGHEST - 1)
+def degree_of(stages, length, reach):
+    """Of which degree the virtual changes are within a step of so many stages.
+
+    length: of the step (s). reach: how long behind its start the last stage lies (s).
+
+    A step that ends at an event has the stages of the step that was cut there, which lie up to far behind its end, and
+    their weights are small. The higher moments of what these stages give all but cancel: in a short step nothing is
+    left of them but the error of the method, and rounding.
+    """
+    degree = HIGHEST if stages >= MANY else min(stages - 1, HIGHEST - 1)
+    if length < SQUARES_FROM * reach:
+        return min(degree, 1)
+    return min(degree, 2) if length < CUBES_FROM * reach else degree
 
 
 @part

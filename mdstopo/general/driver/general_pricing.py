@@ -426,9 +426,9 @@ def _between_stages(values: FloatArray, when: FloatArray, stages: slice, begin: 
     own = values[stages]
     if length <= 0.0 or not own.any():
         return np.zeros((NODES, *own.shape[1:]))
-    degree = degree_of.py_func(len(own))  # type: ignore[attr-defined]
-    fraction = (when[stages] - begin) / length
-    at_stages = np.polynomial.legendre.legvander(2.0 * fraction - 1.0, degree)
+    behind = when[stages] - begin
+    degree = degree_of.py_func(len(own), length, behind.max())  # type: ignore[attr-defined]
+    at_stages = np.polynomial.legendre.legvander(2.0 * behind / length - 1.0, degree)
     found: FloatArray = np.tensordot(AT_NODES[:, : degree + 1] @ at_stages.T, own, axes=1)
     return found
 

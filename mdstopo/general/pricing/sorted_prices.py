@@ -225,7 +225,7 @@ def price_each(tile, s, first, size, c, to):
             for m in range(wide):
                 switching[5][0, m] = sets[0, places[at + m]]
             take_members(model, places[at : at + wide], wide, np.int64(TOGETHER))
-            price_switched(model, candidates, k, wide, s, old, new, tile.error, switching)
+            price_switched(model, candidates, k, wide, s, old, new, switching)
             for m in range(wide):
                 b = places[at + m]
                 fresh[b] = switching[5][1, m]

@@ -12,13 +12,12 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import inverse_root, lanes, load, store, zero
-from mdstopo.general.design.followed_member import GAUSS, LOCATED, NODE_ROWS, ROUNDING
+from mdstopo.general.design.followed_member import GAUSS, LOCATED, NODE_ROWS
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, MOVES, NODE, NODES, POWERS
-from mdstopo.general.pricing.switching_prices import at_places, fill_law, range_of
+from mdstopo.general.pricing.switching_prices import at_places, fill_law
 from mdstopo.mechanics.kinematics.kinematics_interface import ALONG, ELONGATION, RATE, WORKS, member_works
 from mdstopo.mechanics.laws.law_table import (
-    law,
     law_degree,
     law_is_given,
     law_is_idle,
@@ -63,7 +62,7 @@ def is_quick(code, p, curves):
 
 
 @kernel
-def price_switched(model, candidates, k, count, s, old, new, error, switching):
+def price_switched(model, candidates, k, count, s, old, new, switching):
     """What members do in a step in which they leave one mode for another, and none for a third one.
 
     In:
@@ -72,7 +71,6 @@ def price_switched(model, candidates, k, count, s, old, new, error, switching):
       count: how many there are, TOGETHER at most.
       s: the number of the step.
       old, new: the modes.
-      error: by which a price may be off.
     In place:
       switching: of `make_switching`: sets in row 0 are those with which members begin; of what is found SUM counts, NaN
         where a member has to be followed by itself; sets in row 1 are those with which they end.
@@ -87,11 +85,6 @@ def price_switched(model, candidates, k, count, s, old, new, error, switching):
         member_works(model, np.int64(0), count, candidates.node_pose[o], candidates.node_change[o], works[m])
         for i in range(0, count, lanes()):
             store(works[m, ELONGATION], i, load(works[m, ELONGATION], i) - load(sets[0], i))
-    if _worth_of_rounding(model, candidates, k, count, s, old, new, works) > error:
-        for i in range(count):
-            found[SUM, i] = np.nan
-            sets[1, i] = sets[0, i]
-        return
     by_x, by_rate, rest = _linear_margin(code, p, model.curves, free[0], time, old, works)
     for i in range(0, count, lanes()):
         for a in range(NODES):
@@ -110,32 +103,6 @@ def price_switched(model, candidates, k, count, s, old, new, error, switching):
         _check(code, p, model.curves, free[i], time, old, new, i, switching)
     if candidates.step[s, MOVES] != 0:
         _add_pieces(model, candidates, k, s, count, old, new, switching)
-
-
-@part
-def _worth_of_rounding(model, candidates, k, count, s, old, new, works):
-    """What rounding of the elongation may be worth in the integral over a step.
-
-    In a step of some 1e-8 s, between two switches of members that are built, virtual changes may be large and all but
-    cancel. Then prices are those of members that are followed one by one only where both round alike.
-
-    model, candidates, k, count, s, old, new: as of `price_switched`.
-    works (NODES, WORKS, TOGETHER): what the members do at the nodes.
-    """
-    code = candidates.run[k, CODE]
-    stiffness = 0.0
-    rest = model.member[MEMBER_FREE_LENGTH, 0]
-    x = works[0, ELONGATION, 0]
-    for mode in (old, new):
-        _, by_x, _, _, _ = law(
-            code, candidates.law[k], x, works[0, RATE, 0], mode, candidates.step_time[s, 0], 0.0, model.curves, rest
-        )  # fmt: skip
-        stiffness = max(stiffness, abs(by_x))
-    most = 0.0
-    for m in range(NODES):
-        low, high = range_of(works[m, ALONG], count)
-        most = max(most, -low, high)
-    return ROUNDING * (1.0 + rest + abs(x)) * stiffness * most
 
 
 @part
