@@ -1,13 +1,15 @@
 """What Numba is spared while it compiles changes nothing: types, values and errors are those that it comes to alone."""
 
 import gc
+import warnings
 
 import numpy as np
 import pytest
 from llvmlite import binding as llvm
 
 from mdstopo.compiler import tried
-from mdstopo.compiler.jit import entry, kernel, member_kernel, vector_entry
+from mdstopo.compiler.jit import by_type, entry, kernel, member_kernel, vector_entry
+from mdstopo.compiler.kernel import numba
 
 pytestmark = pytest.mark.skipif(not tried.has_own_passes(), reason="Numba compiles with its own passes")
 
@@ -223,3 +225,35 @@ def test_long_loops_are_optimised_once(split: str, monkeypatch) -> None:
     passes = [sum(any("_inner" in name for name in names) for names in optimised)]
     passes += [sum(any("_outer" in name for name in names) for names in optimised)]
     assert passes == [2, 2]  # Numba makes two passes over a module
+
+
+def _noted(x):
+    """Stands for the kernel `_same`."""
+
+
+@kernel
+def _same(x):
+    return x
+
+
+def _choose(kind):
+    warnings.warn(numba().NumbaWarning("slow"), stacklevel=1)
+    return _same
+
+
+by_type(_noted, "x", _choose)
+
+
+@entry
+def warned(x):
+    return _noted(x) + 1.0
+
+
+def test_what_is_warned_of_is_told_once_with_the_place_of_the_call() -> None:
+    dispatcher = warned.dispatcher
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        tried.private().build(dispatcher, "f")
+    place = warned.py_func.__code__.co_firstlineno + 2
+    assert [(each.filename, each.lineno) for each in found] == [(__file__, place)]
+    assert "slow" in str(found[0].message)

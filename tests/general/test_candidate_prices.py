@@ -4,8 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import mdstopo
 from mdstopo.case.reader import read_case
@@ -506,9 +504,8 @@ def images_of(scene, alpha):
     return evaluator.candidates_of(case.members[0]), states
 
 
-def random_law(rng):
+def random_law(rng, kind):
     """A law with modes, with random numbers."""
-    kind = rng.choice(["gap", "crush", "curve", "actuator", "expression"])
     side = {"side": str(rng.choice(["tension", "compression"]))}
     later = {"active_from": float(rng.uniform(0.02, 0.2))} if rng.random() < 0.3 else {}
     if kind == "gap":
@@ -524,7 +521,7 @@ def random_law(rng):
     else:
         numbers = {"k": 500.0, "g": float(rng.uniform(-0.02, 0.1)), "c": 3.0}
         own = {"force": "k*max(x - g, 0) + c*xd*step(x - g)", "parameters": numbers}
-    return {"type": str(kind), **own, **later}
+    return {"type": kind, **own, **later}
 
 
 def assert_pass_is_right(candidates, states):
@@ -540,12 +537,12 @@ def assert_pass_is_right(candidates, states):
     assert np.abs(found[there] - exact[there]).max() <= 5.0 * max(error, 1e-12 * np.abs(exact[there]).max(), 1e-20)
 
 
-@settings(max_examples=examples(6, 80), derandomize=True, deadline=None)
-@given(st.integers(0, 10**6))
-def test_passes_over_random_tiles_know_what_each_of_their_candidates_is_worth(seed):
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("seed", range(examples(1, 16)))
+@pytest.mark.parametrize("kind", ["gap", "crush", "curve", "actuator", "expression"])
+def test_passes_over_random_tiles_know_what_each_of_their_candidates_is_worth(kind, seed):
+    rng = np.random.default_rng([seed, *kind.encode()])
     looks = [ENERGY, looked("energy", "mean"), looked(PULL, "max"), looked(PUSH, "rms"), STOP, {}]
-    scene = dense(arm(random_law(rng), **looks[rng.integers(len(looks))]), 10.0 ** rng.uniform(-2.5, -0.5))
+    scene = dense(arm(random_law(rng, kind), **looks[rng.integers(len(looks))]), 10.0 ** rng.uniform(-2.5, -0.5))
     assert_pass_is_right(*states_of(scene, 0.2))
 
 

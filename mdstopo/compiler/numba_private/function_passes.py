@@ -87,6 +87,20 @@ if not LEAN:
     LEANER = {}
 
 
+def canonicalise(function: Any) -> None:
+    """Give each loop a single back edge, as Numba does after every pass: where a pass has left the edges between blocks
+    as they were found to be right before, there is nothing to do."""
+    edges = _edges(function)
+    if getattr(function, "_mdstopo_edges", None) != edges:
+        function.blocks = transforms.canonicalize_cfg(function.blocks)
+        function._mdstopo_edges = edges if _edges(function) == edges else None
+
+
+def _edges(function: Any) -> list[tuple[Any, ...]]:
+    """Of each block its place, and those of the blocks that it leads to."""
+    return [(place, *block.terminator.get_targets()) for place, block in function.blocks.items()]
+
+
 class Passes(PassManager):
     """Passes over a function of ours: nobody listens to them or asks how long each took."""
 
@@ -99,4 +113,4 @@ class Passes(PassManager):
         if any(changed):
             postproc.PostProcessor(state.func_ir).run()
         else:
-            state.func_ir.blocks = transforms.canonicalize_cfg(state.func_ir.blocks)
+            canonicalise(state.func_ir)

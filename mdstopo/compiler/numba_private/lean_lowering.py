@@ -93,14 +93,31 @@ class Lower(NumbaLower):
             super().delvar(name)
 
     def lower_inst(self, inst: Any) -> None:
-        if not isinstance(inst, ir.Assign) or inst.target.name not in self._borrowed:
+        kind = type(inst)
+        if kind is ir.Del:
+            self.delvar(inst.value)
+        elif kind is not ir.Assign:
             super().lower_inst(inst)
-            return
-        self.context = self._plain
-        try:
-            super().lower_inst(inst)
-        finally:
-            self.context = self._counting
+        elif inst.target.name not in self._borrowed:
+            self._assign(inst)
+        else:
+            self.context = self._plain
+            try:
+                self._assign(inst)
+            finally:
+                self.context = self._counting
+
+    def _assign(self, inst: Any) -> None:
+        """Numba's own also writes down each statement as text, which only `NUMBA_DEBUG_JIT` shows."""
+        place: Any = self.loc
+        self.debuginfo.mark_location(self.builder, place.line)
+        self.notify_loc(place)
+        value = self.lower_assign(self.typeof(inst.target.name), inst)
+        argument = None
+        if isinstance(inst.value, ir.Arg):
+            self.debuginfo.mark_location(self.builder, self.defn_loc.line)
+            argument = inst.value.index + 1
+        self.storevar(value, inst.target.name, argidx=argument)
 
     def lower_expr(self, resty: Any, expr: Any) -> Any:
         if expr.op in ("getiter", "iternext", "pair_first", "pair_second"):

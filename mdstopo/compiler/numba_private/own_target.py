@@ -35,6 +35,18 @@ TARGET = "mdstopo"
 class _Calls(callconv.CPUCallConv):
     """Numba's convention of calls, in fewer instructions."""
 
+    def __init__(self, context: Any) -> None:
+        super().__init__(context)
+        #: by the places of types in memory, these types, which so live on, and what packs arguments of them
+        self._packers: dict[tuple[int, ...], Any] = {}
+
+    def _get_arg_packer(self, argtypes: Any) -> Any:
+        """What packs values of these types into arguments, found out once: an array is seven arguments or more."""
+        key = tuple(map(id, argtypes))
+        if key not in self._packers:
+            self._packers[key] = tuple(argtypes), super()._get_arg_packer(argtypes)
+        return self._packers[key][1]
+
     def call_function(
         self, builder: Any, callee: Any, resty: Any, argtys: Any, args: Any, attrs: Any = None
     ) -> tuple[Any, Any]:

@@ -6,11 +6,14 @@ It asks what the sum of two floats is, trying dozens of candidates each time. So
 
 import functools
 import hashlib
+import math
+import warnings
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
 
 import numba
 import numba.np.arrayobj
+import numpy as np
 from llvmlite import ir as llvm_ir
 from numba import types
 from numba.core import (
@@ -18,17 +21,18 @@ from numba.core import (
     consts,
     cpu_options,
     errors,
+    interpreter,
     ir,
     itanium_mangler,
     lowering,
     postproc,
     targetconfig,
-    transforms,
     typeinfer,
+    utils,
 )
 from numba.extending import overload
 
-from mdstopo.compiler.numba_private.function_passes import LEAN
+from mdstopo.compiler.numba_private.function_passes import LEAN, canonicalise
 from mdstopo.compiler.numba_private.own_target import TARGET, Dispatcher
 
 #: of what is not typed
@@ -52,7 +56,7 @@ def _enter_sizes() -> None:
 
 def _spare_registries() -> None:
     """Before every function Numba imports all that may have something to register: at the first one is enough, and
-    then what has been registered since is taken from those that it came to."""
+    then what has been registered since, if anything was, is taken from those that it came to."""
     for context in (Dispatcher.targetdescr.typing_context, Dispatcher.targetdescr.target_context):
         _load_once(context)
 
@@ -60,13 +64,20 @@ def _spare_registries() -> None:
 def _load_once(context: Any) -> None:
     whole = context.load_additional_registries
     known: list[Any] = []
+    lists: list[Any] = []
+    count = 0
 
     def load() -> None:
+        nonlocal count
         if not known:
             whole()
             known.extend(context._registries)
-        for each in known:
-            context.install_registry(each)
+            lists.extend(getattr(each, name) for each in known for name in context._registries[each].registry_items)
+        now = sum(map(len, lists))
+        if now != count:
+            count = now
+            for each in known:
+                context.install_registry(each)
 
     context.load_additional_registries = load
 
@@ -139,8 +150,9 @@ def _spare_flags() -> None:
 def _spare_variables() -> None:
     """Which variables a statement mentions is asked again and again: what by its type can hold none is passed over."""
     instruction: Any = ir.Inst
-    found_in, variable = instruction._rec_list_vars, ir.Var
-    others = frozenset({ir.Loc, str, int, float, bool, type(None)})
+    found_in, variable, expression = instruction._rec_list_vars, ir.Var, ir.Expr
+    others = frozenset({ir.Loc, ir.Const, ir.Global, ir.FreeVar, ir.Arg, str, int, float, bool, type(None)})
+    others |= {BuiltinFunctionType, FunctionType}
 
     def variables(self: Any, held: Any) -> list[Any]:
         kind = type(held)
@@ -148,6 +160,8 @@ def _spare_variables() -> None:
             return [held]
         if kind in others:
             return []
+        if kind is expression:
+            held, kind = held._kws, dict
         if kind is not dict and kind is not tuple and kind is not list:
             return list(found_in(self, held))
         found = []
@@ -176,6 +190,40 @@ def _spare_globals() -> None:
     context.resolve_value_type = resolve
 
 
+def _spare_attributes() -> None:
+    """Of which type an attribute of a structure or of NumPy is, is looked for once, and not in every round of type
+    inference."""
+    context: Any = Dispatcher.targetdescr.typing_context
+    ask = context.resolve_getattr
+    lasting = math, np
+    known: dict[tuple[int, str], Any] = {}  # by the type's place in memory: its hash goes through all its fields
+
+    def resolve(kind: Any, name: str) -> Any:
+        if not (isinstance(kind, types.StructRef) or (isinstance(kind, types.Module) and kind.pymod in lasting)):
+            return ask(kind, name)
+        key = id(kind), name
+        if key not in known:
+            found = ask(kind, name)
+            if found is None:
+                return None
+            known[key] = kind, found  # the type lives on, and nothing else comes to its place
+        return known[key][1]
+
+    context.resolve_getattr = resolve
+
+
+def _spare_exits() -> None:
+    """What ends a `with` is taken out of functions that have one; in others it need not be looked for."""
+    translation: Any = interpreter
+    whole = translation.peep_hole_delete_with_exit
+
+    def remove(function: Any) -> Any:
+        has_one = any(isinstance(each, ir.EnterWith) for block in function.blocks.values() for each in block.body)
+        return whole(function) if has_one else function
+
+    translation.peep_hole_delete_with_exit = remove
+
+
 def _spare_lifetimes() -> None:
     """After most passes over a function nobody asks which variables live where: it is found out when somebody does."""
     processor: Any = postproc.PostProcessor
@@ -186,7 +234,7 @@ def _spare_lifetimes() -> None:
         if emit_dels or function.is_generator:
             whole(self, emit_dels, extend_lifetimes)
             return
-        function.blocks = transforms.canonicalize_cfg(function.blocks)
+        canonicalise(function)
         function.variable_lifetime = postproc.VariableLifetime(function.blocks)
         function.generator_info = None
 
@@ -323,6 +371,39 @@ def _spare_rounds() -> None:
     network.append = append
 
 
+def _spare_warnings() -> None:
+    """In every round of type inference Numba catches the warnings of each rule in a context of Python's of its own. One
+    context for a round is enough, where after each rule it is seen whether it has warned."""
+    network: Any = typeinfer.ConstraintNetwork
+
+    def propagate(self: Any, infer: Any) -> list[Any]:
+        found: list[Any] = []
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", _ERRORS.NumbaWarning)
+            for constraint in self.constraints:
+                try:
+                    constraint(infer)
+                except _ERRORS.ForceLiteralArg as error:
+                    found.append(error)
+                except _ERRORS.TypingError as error:
+                    located = _ERRORS.TypingError(str(error), loc=constraint.loc, highlighting=False)
+                    found.append(utils.chain_exception(located, error))
+                if told:
+                    _tell(infer, constraint.loc, told)
+        return found
+
+    network.propagate = propagate
+
+
+def _tell(infer: Any, loc: Any, told: list[Any]) -> None:
+    """Hand on what a rule at a place has warned of, as if it had been alone."""
+    now = told[:]
+    told.clear()
+    with infer.warnings.catch_warnings(filename=loc.filename, lineno=loc.line):
+        for each in now:
+            warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
+
+
 def _is_operator(function: Any) -> bool:
     return getattr(function, "__module__", None) == "_operator"
 
@@ -338,6 +419,8 @@ def spare_numba() -> None:
     _remember_signatures()
     _spare_flags()
     _spare_variables()
+    _spare_attributes()
+    _spare_exits()
     _spare_lifetimes()
     _spare_failures()
     _spare_globals()
@@ -346,5 +429,6 @@ def spare_numba() -> None:
     _spare_places()
     _spare_ranges()
     _spare_rounds()
+    _spare_warnings()
     names: Any = itanium_mangler
     names._escape_string = functools.lru_cache(1 << 16)(names._escape_string)
