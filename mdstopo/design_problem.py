@@ -96,8 +96,8 @@ class DesignProblem:
             or self.even > 0
             or any(not kind_of(objective.response).is_energy for objective in self._objectives)
         )
-        #: no U is below it: a length cannot be less than 0
-        self.least = 0.0 if one and never_negative(self._objectives[0]) else -np.inf
+        #: no U is below it
+        self.objective_bound = bound_of(self._objectives[0]) if one else -np.inf
         aims: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
         members = any(kind_of(each.response).of_members for each in aims)
         # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
@@ -340,11 +340,13 @@ def sign_of(objective: Objective) -> float:
     return -1.0 if objective.sense == "maximize" else 1.0
 
 
-def never_negative(objective: Objective) -> bool:
-    """Whether an objective is to be lowered and cannot be below zero: a length, a magnitude, a mean square."""
+def bound_of(objective: Objective) -> float:
+    """What an objective cannot be below, with the sign with which it is minimised: 0 of a length, a magnitude or a mean
+    square, else -inf."""
     response = objective.response
     is_length = kind_of(response).never_negative or response.component == "norm"
-    return sign_of(objective) > 0.0 and (is_length or REDUCTIONS[objective.over_time].ignores_sign)
+    positive = is_length or REDUCTIONS[objective.over_time].ignores_sign
+    return 0.0 if positive and sign_of(objective) > 0.0 else -np.inf
 
 
 def competes(aim: Objective | ResponseRow, sign: float) -> bool:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mdstopo.case.model import Case
+    from mdstopo.cli.gradient_numbers import Reach
     from mdstopo.engine import Evaluator
     from mdstopo.evaluation import Evaluation
 
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
 USUAL = (DEFAULT_SENSITIVITY, having("of_histories")[0])
 _TIGHT = 1e-12  # solver tolerance for differences: what the integrator leaves of noise is divided by the step
 _SHOWN = 6  # values of a variable that are shown
-_COMPETING = (0.3, 12)  # how far below the highest peaks are looked at, and how many
 _OFF = 1e-6  # from where on a difference from differences is looked into
 
 
@@ -128,8 +128,7 @@ def command(
         for method, result in results.items():
             datasets |= sensitivity_part(result["gradients"], method, result["by_variable"])
         if differencing and not failure:
-            failure = _difference(case, alpha, count, results, datasets)
-            _look_into_differences(engine, alpha, count, results)
+            failure = _difference(engine, case, alpha, count, results, datasets)
         if history and not failure:
             failure = _histories(engine, case, alpha, datasets)
         status = RunStatus.FAILED if failure else RunStatus.CONVERGED
@@ -218,6 +217,7 @@ def _in_words(evaluation: "Evaluation") -> str:
 
 
 def _difference(
+    engine: "Evaluator",
     case: "Case",
     alpha: "NDArray[np.float64]",
     count: int,
@@ -228,7 +228,7 @@ def _difference(
     import numpy as np
 
     from mdstopo.case.methods.integrators import AUTO, INTEGRATORS
-    from mdstopo.cli.gradient_numbers import chosen_members, differences, ranges, value_differences
+    from mdstopo.cli.gradient_numbers import chosen_members, differences, ranges, reach_of, value_differences
     from mdstopo.evaluators import evaluator_of
 
     members = chosen_members(case.n_design, count, case.optimizer.seed)
@@ -265,31 +265,33 @@ def _difference(
             whole[case.n_design + places] = values / ranges(case)[places]
             named = case.space.named(whole)
             datasets |= {f"differences/variables/{name}/{variable}": each for variable, each in named.items()}
+    _look_into_differences(engine, alpha, reach_of(case, alpha, members, places), results)
     return ""
 
 
 def _look_into_differences(
-    engine: "Evaluator", alpha: "NDArray[np.float64]", count: int, results: dict[str, dict[str, Any]]
+    engine: "Evaluator", alpha: "NDArray[np.float64]", reach: "Reach", results: dict[str, dict[str, Any]]
 ) -> None:
-    """Note with the first method where differences are off because another peak becomes the highest within a step."""
-    from mdstopo.cli.gradient_numbers import changes_peak, chosen_members
+    """Note with the first method where differences are off because another peak becomes decisive within a step.
+
+    reach: where differences have looked.
+    """
+    from mdstopo.cli.gradient_numbers import changes_peak
+    from mdstopo.design_problem import ALL
     from mdstopo.evaluation import Rows
 
-    result = next(iter(results.values()))
-    off = [name for name, difference in result.get("differences", {}).items() if difference > _OFF]
-    if not off:
+    method, result = next(iter(results.items()))
+    off = [name for name, difference in result["differences"].items() if difference > _OFF]
+    found = engine.evaluate(alpha, sensitivity=method, rows=Rows(*ALL)) if off else None
+    if found is None or not found.status.usable:
         return
-    case = engine.case
-    members = chosen_members(case.n_design, count, case.optimizer.seed)
-    peaks = engine.evaluate(alpha, rows=Rows(*_COMPETING)).peaks
-    size = float(alpha[: case.n_design].max(initial=0.0))
-    tied = [name for name in off if changes_peak(peaks[name], alpha, members, size)]
+    tied = [name for name in off if changes_peak(found.peaks[name], reach)]
     if tied:
-        told = [result["message"]] if result["message"] else []
-        result["message"] = "; ".join(
-            [*told, f"of {', '.join(tied)} another peak becomes decisive within a step of the differences, "
-             "which are no derivative there; the gradient is that of the peak which is decisive"]
-        )  # fmt: skip
+        why = (
+            f"of {', '.join(tied)} another peak becomes decisive within a step of the differences, which are no "
+            "derivative there; the gradient is that of the peak which is decisive"
+        )
+        result["message"] = "; ".join(filter(None, [result["message"], why]))
 
 
 def _histories(engine: "Evaluator", case: "Case", alpha: "NDArray[np.float64]", datasets: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,18 +126,39 @@ def _step(alpha: Floats, member: int, size: float | None) -> float:
     return min(step, 0.5 * here) if here > 0.0 else step
 
 
-def changes_peak(peaks: "Sequence[Peak]", alpha: Floats, members: NDArray[np.intp], size: float) -> bool:
-    """Whether a step of `differences` by one of the members makes another peak decisive than the first one.
+class Reach(NamedTuple):
+    """Where differences look: places (K,) in the whole design (N + P,), the longest step (K,) by each in its own unit,
+    and whether steps are taken to both sides (K,)."""
 
-    peaks: those that compete, the decisive one first, with gradients. size: as of `differences`.
+    places: NDArray[np.intp]
+    steps: Floats
+    both: NDArray[np.bool_]
+
+
+def reach_of(case: "Case", design: Floats, members: NDArray[np.intp], values: NDArray[np.intp]) -> Reach:
+    """Where `differences` by members and `value_differences` by values look, from a design (N + P,)."""
+    n, width = case.n_design, ranges(case)
+    low = np.concatenate([np.full(each.count, each.lower) for each in case.variables] or [np.zeros(0)])
+    shares = (design[n:] - low) / width
+    by_members = [_step(design[:n], int(member), None) for member in members]
+    by_values = [_step(shares, int(value), 1.0) * width[value] for value in values]
+    both = np.concatenate([design[members] > 0.0, shares[values] > 0.0])
+    return Reach(np.concatenate([members, n + values]), np.array([*by_members, *by_values]), both)
+
+
+def changes_peak(peaks: "Sequence[Peak]", reach: Reach) -> bool:
+    """Whether a step of differences makes another peak decisive than the first one.
+
+    peaks: those that compete, the decisive one first, with gradients by the whole design.
     """
-    steps = np.array([_step(alpha, int(member), size) for member in members])
     first = peaks[0]
     for other in peaks[1:]:
         if first.gradient is None or other.gradient is None:
             continue
-        reach = np.abs(other.gradient - first.gradient)[members] * steps
-        if reach.max(initial=0.0) > abs(first.value - other.value):
+        gap = first.value - other.value
+        nearer = (other.gradient - first.gradient)[reach.places] * (reach.steps if gap >= 0.0 else -reach.steps)
+        overtakes = np.where(reach.both | (gap == 0.0), np.abs(nearer), nearer)
+        if overtakes.max(initial=0.0) > abs(gap):
             return True
     return False
 

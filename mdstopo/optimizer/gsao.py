@@ -71,7 +71,7 @@ class Gsao:
         self.separable = SeparableMethod(space, self._measures, settings, getattr(problem, "competitors", None))
         #: whether rows compete from the start; else the separable model begins
         self.competes = bool(getattr(problem, "competes", False))
-        self.least = float(getattr(problem, "least", -np.inf))
+        self.objective_bound = float(getattr(problem, "objective_bound", -np.inf))
         self.bundle = self._bundle_method(space) if settings.flag("bundle") else None
 
     def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
@@ -127,7 +127,7 @@ class Gsao:
     def terminate(self, state: State) -> tuple[RunStatus, str]:
         """Whether a state goes on, and if not why."""
         assert isinstance(state, GsaoState)
-        return verdict(state, self._is_stuck(state), self.settings, self.least)
+        return verdict(state, self._is_stuck(state), self.settings, self.objective_bound)
 
     # The steps of the loop.
 
@@ -251,9 +251,10 @@ class Gsao:
             self._report_iterate(state)
         return state
 
-    @staticmethod
-    def _report_iterate(state: GsaoState) -> None:
+    def _report_iterate(self, state: GsaoState) -> None:
         """What has converged is what is told, where a design before it is better by no more than limits are kept to."""
-        if abs(state.objective - state.best_objective) <= EQUAL * abs(state.best_objective):
+        if state.violation <= self.settings.tolerance and abs(state.objective - state.best_objective) <= EQUAL * abs(
+            state.best_objective
+        ):
             state.best_alpha, state.best_objective = state.alpha, state.objective
             state.best_violation, state.best_plain = state.violation, plain_violation(state.sample)

@@ -129,7 +129,7 @@ class Problem(Protocol):
         options `peaks` and `peak_window` say.
     even (int, else 0): how many of the last variables are drawn uniformly at every random start, because no part of
         their range is likelier than another.
-    least (float, else -inf): no U is below it.
+    objective_bound (float, else -inf): no U is below it.
     softened(share) -> Problem: the same problem with members that have only this share of their strength, with which
         a start of the family `start_families.Family.SOFTENED` begins; without it such a start begins as the first
         one does.

@@ -157,10 +157,10 @@ def next_shift(shift: Floats, last: Step, step: Step, settings: Settings) -> Flo
     return np.clip(shift * factor, settings.number("shift_minimum"), settings.number("shift_maximum"))
 
 
-def verdict(state: GsaoState, stuck: bool, settings: Settings, least: float = -inf) -> tuple[RunStatus, str]:
+def verdict(state: GsaoState, stuck: bool, settings: Settings, bound: float = -inf) -> tuple[RunStatus, str]:
     """Whether to go on, and if not, why: a function of the state alone, so that a resumed run decides alike.
 
-    stuck: whether the next step would change next to nothing, or the last ones have. least: no U is below it.
+    stuck: whether the next step would change next to nothing, or the last ones have. bound: no U is below it.
     """
     if state.status is RunStatus.FAILED:
         return state.status, state.reason
@@ -170,20 +170,19 @@ def verdict(state: GsaoState, stuck: bool, settings: Settings, least: float = -i
             f"the projected KKT residual, {state.kkt:.2g} of the largest gradient entry, "
             f"is within the tolerance {settings.tolerance:.2g}"
         )
-    if state.restoring and (stuck or is_least(state, settings.tolerance)):
-        return _without_limits(state, settings)
-    exhausted = state.iteration >= settings.max_iterations
-    if (stuck or exhausted) and is_at_least(state, settings.tolerance, least):
+    if stuck and is_at_bound(state, settings.tolerance, bound):
         return RunStatus.CONVERGED, (
-            f"the objective, {state.best_objective:.2g}, cannot be below {least:g}, and what is left is within the "
+            f"the objective, {state.best_objective:.2g}, cannot be below {bound:g}, and what is left is within the "
             f"tolerance {settings.tolerance:.2g} of what the first design had to lose"
         )
+    if state.restoring and (stuck or is_least(state, settings.tolerance)):
+        return _without_limits(state, settings)
     if stuck:
         return RunStatus.STALLED, (
             f"no step is found that lowers the objective, at a projected KKT residual of {state.kkt:.2g} "
             f"where {settings.tolerance:.2g} was asked for"
         )
-    if exhausted:
+    if state.iteration >= settings.max_iterations:
         return RunStatus.MAX_ITERATIONS, (
             f"the limit of {settings.max_iterations} iterations was reached "
             f"at a projected KKT residual of {state.kkt:.2g}{recent_change(state)}"
@@ -204,12 +203,13 @@ def recent_change(state: GsaoState) -> str:
     return f"; the last {count} {'lowered' if change < 0.0 else 'raised'} the objective by {abs(change):.2g} of itself"
 
 
-def is_at_least(state: GsaoState, tolerance: float, least: float) -> bool:
-    """Whether the best design keeps the limits and has lost all that U can lose but a share of `tolerance`: an optimum,
-    whatever its slopes are. The norm of a vector that has come to zero has none."""
-    if not isfinite(least) or state.best_violation > tolerance:
+def is_at_bound(state: GsaoState, tolerance: float, bound: float) -> bool:
+    """Whether the best design keeps the limits and has lost all that the first one had above the bound of U, but a
+    share of `tolerance`: no other is better by more, whatever the slopes are. The norm of a vector that has come to
+    zero has none."""
+    if not isfinite(bound) or state.best_violation > tolerance:
         return False
-    return state.best_objective - least <= tolerance * (state.history.objective[0] - least)
+    return state.best_objective - bound <= tolerance * (state.history.objective[0] - bound)
 
 
 def is_least(state: GsaoState, tolerance: float) -> bool:

@@ -82,9 +82,10 @@ def without_slope(case: Case, found: Evaluation) -> tuple[str, ...]:
 def _largest_change(case: Case, found: Evaluation, name: str) -> float:
     """The largest change of an objective that its slope promises for one variable's whole range."""
     slopes = getattr(found, "variable_gradients", {}).get(name, {})
-    of_alpha = np.abs(found.gradients[name]) * (case.upper - case.lower)
+    width = case.upper - case.lower
+    of_alpha = np.abs(found.gradients[name]) * np.where(width > 0.0, width, 1.0)
     of_variables = [
-        np.abs(slopes[each.name]) * (each.upper - each.lower) for each in case.variables if each.name in slopes
+        np.abs(slopes[each.name]) * (each.upper - each.lower or 1.0) for each in case.variables if each.name in slopes
     ]
     return float(np.concatenate([of_alpha, *of_variables]).max(initial=0.0))
 

@@ -1,6 +1,7 @@
 """The quantities that `check` and `gradient` derive."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -10,9 +11,11 @@ from numpy.typing import NDArray
 from mdstopo.case.reader import read_case
 from mdstopo.cli.check import _say_frequencies
 from mdstopo.cli.check_numbers import depths, frequencies, material, totals
-from mdstopo.cli.gradient_numbers import changes_peak, chosen_members, differences, disagreement
+from mdstopo.cli.gradient import _look_into_differences
+from mdstopo.cli.gradient_numbers import Reach, changes_peak, chosen_members, differences, disagreement, reach_of
 from mdstopo.cli.output import Output
 from mdstopo.evaluation import Peak
+from mdstopo.status import Status
 
 Floats = NDArray[np.float64]
 
@@ -165,13 +168,51 @@ def test_load_cases_with_the_same_frequencies_and_duration_are_said_once() -> No
     assert [table[1] for table in heard.tables] == [["initial", "2", "2"], ["initial", "3", "3"], ["initial", "2", "4"]]
 
 
-def test_a_step_of_differences_that_makes_another_peak_decisive_is_known():
-    def peak(value, *gradient):
-        return Peak(0.1, value, np.array(gradient))
+def peak(value, *gradient):
+    return Peak(0.1, value, np.array(gradient))
 
-    alpha, members = np.array([0.5, 0.5]), np.array([1])
+
+def test_a_step_of_differences_that_makes_another_peak_decisive_is_known():
+    reach = Reach(np.array([1]), np.array([1e-3]), np.array([True]))
     first = peak(2.0, 3.0, -1.0)
-    assert changes_peak([first, peak(2.0 - 1e-4, 3.0, -2.0)], alpha, members, 0.5)  # 1e-3 in a step of 1e-3
-    assert not changes_peak([first, peak(2.0 - 2e-3, 3.0, -2.0)], alpha, members, 0.5)
-    assert not changes_peak([first, peak(2.0 - 1e-4, 30.0, -1.0)], alpha, members, 0.5)  # by a member not taken
-    assert not changes_peak([first], alpha, members, 0.5)
+    assert changes_peak([first, peak(2.0 - 1e-4, 3.0, -2.0)], reach)
+    assert not changes_peak([first, peak(2.0 - 2e-3, 3.0, -2.0)], reach)
+    assert not changes_peak([first, peak(2.0 - 1e-4, 30.0, -1.0)], reach)  # by a member that is not taken
+    assert not changes_peak([first], reach)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["largest", "smallest"])
+def test_a_step_to_one_side_is_judged_by_its_side(sign):
+    reach = Reach(np.array([0]), np.array([1e-3]), np.array([False]))
+    first = peak(sign * 2.0, sign * 3.0)
+    assert not changes_peak([first, peak(sign * (2.0 - 1e-4), sign * -9.0)], reach)
+    assert changes_peak([first, peak(sign * (2.0 - 1e-4), sign * 9.0)], reach)
+
+
+def test_gradient_tells_where_differences_are_no_derivative():
+    """The first method's message has it, and no other; nothing is asked for where differences agree."""
+    peaks = {"G": (peak(2.0, 3.0), peak(2.0, 1.0)), "H": (peak(2.0, 3.0),)}
+    asked = []
+
+    def evaluate(alpha, sensitivity, rows):
+        asked.append(sensitivity)
+        return SimpleNamespace(status=Status.OK, peaks=peaks)
+
+    reach = Reach(np.array([0]), np.array([1e-3]), np.array([True]))
+    for off, told in ((1e-3, True), (1e-9, False)):
+        results = {m: {"differences": {"G": off, "H": off}, "message": ""} for m in ("adjoint", "direct")}
+        _look_into_differences(cast(Any, SimpleNamespace(evaluate=evaluate)), np.array([0.5]), reach, results)
+        assert results["adjoint"]["message"].startswith("of G another peak") is told
+        assert results["direct"]["message"] == ""
+    assert asked == ["adjoint"]
+
+
+def test_where_differences_look():
+    text = CASE.replace(
+        "objectives:", "design: {variables: {k: {group: m, parameter: stiffness, lower: 1, upper: 21}}}\nobjectives:"
+    )
+    case = read_case(text)
+    reach = reach_of(case, np.array([0.0, 5.0]), np.array([0]), np.array([0]))
+    assert reach.places.tolist() == [0, 1]
+    assert reach.both.tolist() == [False, True]
+    assert reach.steps == pytest.approx([2e-3, 2e-3 * 20.0])

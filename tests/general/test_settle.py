@@ -183,6 +183,30 @@ solver: {{settle: true}}
     assert np.abs(motion.q[0, 3:]).max() > 1e-3
 
 
+@pytest.mark.parametrize("axis", [[1, 0], [3, 1]], ids=["level", "oblique"])
+def test_a_cart_on_its_rail_keeps_its_place_while_what_hangs_on_it_settles(axis):
+    text = f"""
+format: 1
+time: {{end: 0.1}}
+bodies:
+  cart: {{mass: 3, inertia: 1, position: [0, 0]}}
+  lamp: {{mass: 2, inertia: 0.4, position: [3, 0.4]}}
+joints: [{{type: prismatic, bodies: [ground, cart], at: [0, 0], axis: {axis}}}]
+members:
+  cord: {{from: {{body: cart, at: [1, 0]}}, to: {{body: lamp, at: [2.9, 0.2]}}, law: {{type: spring, stiffness: 50}}}}
+  tie: {{from: {{body: cart, at: [1, 1]}}, to: {{body: lamp, at: [3, 0.2]}}, law: {{type: spring, stiffness: 70,
+    free_length: 2}}}}
+  bar: {{from: {{body: cart, at: [0, -1]}}, to: {{body: lamp, at: [3, -1]}}, law: {{type: spring, stiffness: 60}}}}
+solver: {{settle: true}}
+"""
+    motion = mdstopo.simulate(read_case(text))
+    assert np.abs(motion.q - motion.q[0]).max() < 1e-9
+    assert abs(motion.q[0, 5]) > 1e-3  # the lamp has turned
+    along = np.array(axis) / np.hypot(*axis)
+    moved = 3 * motion.q[0, :2] + 2 * (motion.q[0, 3:5] - [3, 0.4])
+    assert abs(moved @ along) < 1e-9  # nothing pushes along the rail
+
+
 def test_velocities_that_do_not_fit_where_the_scene_settles_are_refused():
     text = """
 format: 1

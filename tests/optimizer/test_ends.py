@@ -68,11 +68,23 @@ def distance(x):
 def test_what_has_come_to_the_least_that_is_possible_has_converged() -> None:
     problem = Toy(distance, [0.9, 0.1], 0.0, 1.0)
     assert ended(problem).status is RunStatus.STALLED
-    problem.least = 0.0
+    problem.objective_bound = 0.0
     state = ended(problem)
     assert state.status is RunStatus.CONVERGED
     assert "cannot be below 0" in state.reason
     assert state.best_objective < 1e-6
+
+
+def test_a_run_that_still_falls_when_its_iterations_are_used_up_has_not_converged() -> None:
+    def steep(x):
+        away = x[0] - 0.3
+        return np.array([1e-8 + away**4]), np.array([[4.0 * away**3]])
+
+    problem = Toy(steep, [1.0], 0.0, 1.0)
+    problem.objective_bound = 0.0
+    state = ended(problem, max_iterations=13)
+    assert state.best_objective < 1e-6 * state.history.objective[0]
+    assert state.status is RunStatus.MAX_ITERATIONS
 
 
 def test_a_bound_that_is_not_reached_makes_nothing_converge() -> None:
@@ -81,7 +93,7 @@ def test_a_bound_that_is_not_reached_makes_nothing_converge() -> None:
     ends = []
     for least in (-np.inf, 0.0):
         problem = Toy(distance, [0.1, 0.1], 0.0, 1.0, limit)
-        problem.least = least
+        problem.objective_bound = least
         ends.append(ended(problem))
     assert ends[0].reason == ends[1].reason
     assert ends[1].best_objective > 0.09

@@ -64,6 +64,26 @@ def test_a_load_settles_with_its_heading_and_gradients_know_where() -> None:
         assert np.abs(direct.gradients[name] - gradient).max() < 1e-9 * np.abs(gradient).max(), name
 
 
+def test_a_load_on_a_rail_has_no_free_turn() -> None:
+    rail = "joints: [{type: prismatic, bodies: [ground, crate], at: [0.1, 0.05, 0.5], axis: [1, 0, 0]}]\nmembers:"
+    case = read_case(CRATE.replace("members:", rail))
+    q = mdstopo.simulate(case).q[0]
+    assert np.abs(q[3:7] - [np.cos(0.15), 0, 0, np.sin(0.15)]).max() < 1e-12
+    assert abs(100 * (q[0] - 0.1) + 5 * (q[7] - 0.3)) < 1e-9
+
+
+def test_two_loads_keep_a_heading_each() -> None:
+    """The second, much heavier one hangs on a ball, from which it is drawn askew."""
+    bell = "  bell: {mass: 1.0e+6, inertia: [2.0e+5, 3.0e+5, 1.0e+5], position: [8.3, 0.2, 0.1]}\npoints:"
+    ball = "joints: [{type: spherical, bodies: [ground, bell], at: [8, 0, 1]}]\nmembers:"
+    case = read_case(CRATE.replace("points:", bell, 1).replace("members:", ball, 1))
+    q = mdstopo.simulate(case).q[0]
+    turns = [Rotation.from_quat(q[at : at + 4], scalar_first=True) for at in (3, 17)]
+    assert abs(twist(turns[0]) - 0.3) < 1e-12
+    assert abs(twist(turns[1])) < 1e-12
+    assert turns[1].magnitude() > 0.2
+
+
 def test_a_wheel_that_turns_about_a_level_axis_has_no_heading_and_is_refused() -> None:
     text = """
 format: 1

@@ -41,7 +41,7 @@ class ResponseKind(Value):
     in_space: the word for the same in space, where a planar case is lifted there; empty where nobody has said which.
     is_component: whether that is a vector in space, of which the planar one is the component along the normal.
     of_axis: whether its numbers are a direction in body coordinates.
-    never_negative: whether it is a length or an angle without sign, whatever its keys say.
+    never_negative: whether it is a length, an angle or a force without a sign, whatever its keys say.
     """
 
     word: str

@@ -18,19 +18,19 @@ import numpy as np
 from mdstopo.mechanics.kinematics.kinematics_interface import Headings, Kinematics
 from mdstopo.scene.springs_model import FloatArray
 
-#: of a turn, the part about another axis than the vertical that is taken for rounding; and of a set of directions, the
-#: part of the largest that adds none
-ROUNDING, RANK = 1e-6, 1e-6
+#: what is rounding in directions of length 1 by mass
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
 class FreeTurns:
-    """The turns that nothing holds: directions D (n, r), slopes R (r, n) of the headings of as many bodies, and by how
-    much these have turned since the stated configuration, angles (r,)."""
+    """The turns that nothing holds: directions D (n, r), slopes R (r, n) of the headings of as many bodies, by how much
+    these have turned since the stated configuration, angles (r,), and which they are."""
 
     directions: FloatArray
     slopes: FloatArray
     angles: FloatArray
+    bodies: list[int]
 
     def back(self) -> FloatArray:
         """(n,): the shift that turns the bodies back."""
@@ -45,35 +45,44 @@ class FreeTurns:
         return taken
 
 
-def free_turns(bodies: Kinematics, modes: FloatArray, headings: Headings) -> FreeTurns | int:
-    """The turns among directions (n, k) that nothing holds; or the body that turns where it has no heading.
+def free_turns(bodies: Kinematics, modes: FloatArray, root: FloatArray, headings: Headings) -> FreeTurns | int:
+    """The turns among directions that nothing holds; or the body that turns where it has no heading.
 
-    modes: of length 1 by mass, and orthogonal. headings: of all bodies, at the equilibrium.
+    modes (n, k): the directions in coordinates that are scaled by the roots of masses, root (n,), where they are
+    orthonormal. headings: of all bodies, at the equilibrium.
     """
     if not modes.size:
-        return FreeTurns(modes, modes.T, np.zeros(0))
+        return FreeTurns(modes, modes.T, np.zeros(0), [])
     each, size = bodies.freedoms, bodies.rotations
+    weight = root.reshape(-1, each)[:, -size:]
     turns = modes.reshape(-1, each, modes.shape[1])[:, -size:]
-    square = np.sum(headings.axis**2, axis=1)
-    about = np.einsum("bt,btk->bk", headings.axis, turns) / np.where(square > 0.0, square, 1.0)[:, None]
-    other = np.abs(turns - headings.axis[:, :, None] * about[:, None]).max(axis=(1, 2))
-    if other.max() > ROUNDING * np.abs(turns).max():
+    # each body's turn about the vertical, by mass as the modes are
+    axis = headings.axis * weight
+    length = np.linalg.norm(axis, axis=1)
+    axis = axis / np.where(length > 0.0, length, 1.0)[:, None]
+    about = np.einsum("bt,btk->bk", axis, turns)
+    other = np.abs(turns - axis[:, :, None] * about[:, None]).max(axis=(1, 2))
+    if other.max() > ROUNDING:
         return int(other.argmax())
-    _, sizes, rows = np.linalg.svd(about)
-    count = int(np.sum(sizes > RANK * sizes.max()))
-    chosen = _independent(about, count)
+    chosen = _independent(about)
+    count = len(chosen)
     slopes = np.zeros((count, len(modes)))
     for row, body in zip(slopes, chosen, strict=True):
         row[each * (body + 1) - size : each * (body + 1)] = headings.slope[body]
-    return FreeTurns(modes @ rows[:count].T, slopes, headings.angle[chosen])
+    directions = modes @ np.linalg.svd(about)[2][:count].T if count else modes[:, :0]
+    return FreeTurns(directions / root[:, None], slopes, headings.angle[chosen], chosen)
 
 
-def _independent(about: FloatArray, count: int) -> list[int]:
-    """The first bodies whose rows (n_body, k) are independent, as many as there are."""
+def _independent(about: FloatArray) -> list[int]:
+    """The first bodies whose rows (n_body, k) are independent: what earlier rows leave of one is more than rounding."""
     chosen: list[int] = []
-    for body in range(len(about)):
-        if len(chosen) == count:
-            break
-        if np.linalg.matrix_rank(about[[*chosen, body]], tol=RANK * float(np.abs(about).max())) > len(chosen):
+    basis: list[FloatArray] = []
+    for body, row in enumerate(about):
+        left = row.copy()
+        for unit in basis + basis:  # twice, for orthogonality to rounding
+            left -= (unit @ left) * unit
+        size = float(np.linalg.norm(left))
+        if size > ROUNDING:
             chosen.append(body)
+            basis.append(left / size)
     return chosen

@@ -9,7 +9,7 @@ next one as far back, for ever: each ends at the latest where no force along it 
 continuous this finds a minimum (J.-S. Pang and L. Qi 1995, "A globally convergent Newton method for convex SC1
 minimization problems"). It depends on the design, alpha and the values p of laws' variables, by
 K dq + Phi_q^T dlam = dF, Phi_q dq = 0: `inverse` is that linear map.
-Every search begins at the stated configuration, whatever was found before.
+Every search begins at the stated configuration, whatever was found before; and again where free turns were turned back.
 """
 
 from typing import Any
@@ -36,7 +36,7 @@ NEAR, ARRIVED = 1e-6, 1e-13
 #: stiffness, relative to the largest, below which a direction counts as free
 FREE = 1e-9
 #: how often what turns freely is turned back at most, and how far from its heading it is then at most, rad
-TURNS_BACK, HEADING = 100, 1e-12
+TURNS_BACK, HEADING = 80, 1e-12
 
 
 def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:
@@ -46,42 +46,42 @@ def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: flo
     """
     bodies, names = driver.scene.kinematics, driver.scene.bodies
     scene = _AtRest(driver, alpha, size)
-    q = q0
+    q, turning = q0, 0
     for _ in range(TURNS_BACK):
-        q, found = _equilibrium(scene, q, size)
+        q, found = _equilibrium(scene, q, q0, size)
         if not found or scene.pushed():
             return _nowhere(driver, bodies.difference(q, q0), scene.arms)
         free = scene.free_turns(q, q0)
         if isinstance(free, int):
-            return f"body {names[free]} is free to turn, so that its equilibrium is not determined"
-        if np.abs(free.angles).max(initial=0.0) <= HEADING:
+            turning = free
             break
+        if np.abs(free.angles).max(initial=0.0) <= HEADING:
+            return _settled(driver, q, bodies.difference(q, q0), free.kept(scene.inverse()))
+        turning = free.bodies[int(np.abs(free.angles).argmax())]
         back = free.back()
         q = bodies.retract(q, min(1.0, FAR * size / scene.extent(back)) * back)
-    else:
-        return _nowhere(driver, bodies.difference(q, q0), scene.arms)
-    shift, turn = bodies.shifts_and_turns(bodies.difference(q, q0))
+    return f"body {names[turning]} is free to turn, so that its equilibrium is not determined"
+
+
+def _settled(driver: DriverWithStart, q: FloatArray, change: FloatArray, inverse: FloatArray) -> Settled:
+    """The equilibrium q (n_q,), with how far the bodies have gone from the stated place, a change (n,)."""
+    shift, turn = driver.scene.kinematics.shifts_and_turns(change)
     distance, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
-    far_body, turned_body = int(distance.argmax()), int(angle.argmax())
-    return Settled(
-        q,
-        free.kept(scene.inverse()),
-        float(distance[far_body]),
-        names[far_body],
-        float(angle[turned_body]),
-        names[turned_body],
-    )
+    names = driver.scene.bodies
+    far, turned = int(distance.argmax()), int(angle.argmax())
+    return Settled(q, inverse, float(distance[far]), names[far], float(angle[turned]), names[turned])
 
 
-def _equilibrium(scene: "_AtRest", q0: FloatArray, size: float) -> tuple[FloatArray, bool]:
-    """Where a search from q0 (n_q,) ends, and whether that is an equilibrium."""
-    q, near = _downhill(scene, q0, size)
+def _equilibrium(scene: "_AtRest", q: FloatArray, stated: FloatArray, size: float) -> tuple[FloatArray, bool]:
+    """Where a search from q (n_q,) ends, and whether that is an equilibrium near the stated configuration."""
+    q, near = _downhill(scene, q, stated, size)
     return _newton(scene, q, size) if near else (q, False)
 
 
-def _downhill(scene: "_AtRest", q0: FloatArray, size: float) -> tuple[FloatArray, bool]:
-    """Go from q0 (n_q,) by implicit steps as far as Newton's can take over; where that is, and whether it is near."""
-    q = scene.land(q0.copy())
+def _downhill(scene: "_AtRest", q: FloatArray, stated: FloatArray, size: float) -> tuple[FloatArray, bool]:
+    """Go from q (n_q,) by implicit steps as far as Newton's can take over; where that is, and whether it is near the
+    stated configuration."""
+    q = scene.land(q.copy())
     rate, left = scene.rate(), scene.left()
     pace = 1.0 / rate if rate > 0.0 else size / max(float(np.linalg.norm(left)), 1e-300)
     for _ in range(MOST):
@@ -96,7 +96,7 @@ def _downhill(scene: "_AtRest", q0: FloatArray, size: float) -> tuple[FloatArray
             pace *= GROWTH
         elif off > ahead:
             pace *= 0.5
-        if scene.lost(scene.bodies.difference(q, q0)):
+        if scene.lost(scene.bodies.difference(q, stated)):
             return q, False
         if share * far <= NEAR * size and pace * scene.rate() > 1.0:
             break
@@ -250,11 +250,12 @@ class _AtRest:
     def free_turns(self, q: FloatArray, stated: FloatArray) -> FreeTurns | int:
         """What turns freely at q (n_q,); or a body that turns so where it has no heading."""
         null = self._null()
-        modes = np.zeros((len(self.force), null.shape[1]))
-        modes[self.free] = null / self._root[:, None]
+        modes, root = np.zeros((len(self.force), null.shape[1])), np.ones(len(self.force))
+        modes[self.free], root[self.free] = null, self._root
         scene = self._driver.scene
-        up = np.asarray(scene.load_case.gravity, dtype=np.float64)
-        return free_turns(self.bodies, modes, self.bodies.headings(scene.model.home, up, q, stated))
+        vertical = np.asarray(scene.load_case.gravity, dtype=np.float64)
+        headings = self.bodies.headings(scene.model.home, vertical, q, stated)
+        return free_turns(self.bodies, modes, root, headings)
 
     def extent(self, step: FloatArray) -> float:
         """How far a step (n,) goes: the largest shift of a centre, or angle times the scene's size, m."""

@@ -101,9 +101,12 @@ class Kinematics:
         """The changes (T, n) that lead from coordinates (n_q,) to those of many states (T, n_q)."""
         return after - before
 
-    def headings(self, home: FloatArray, up: FloatArray, q: FloatArray, stated: FloatArray) -> "Headings":
-        """How far bodies at coordinates q (n_q,) have turned about `up` since others. home: of the model; up: a
-        direction, or zeros where there is none; no matter in a plane."""
+    def headings(self, home: FloatArray, vertical: FloatArray, q: FloatArray, stated: FloatArray) -> "Headings":
+        """How far bodies at coordinates q (n_q,) have turned about the vertical since others.
+
+        home: of the model. vertical: a direction of any length, of length zero where there is none, and then no body
+        in space has a heading; in a plane it does not matter.
+        """
         turned = self.shifts_and_turns(self.difference(q, stated))[1]
         return Headings(turned[:, 0], np.ones_like(turned), np.ones_like(turned))
 

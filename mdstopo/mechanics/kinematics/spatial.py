@@ -160,17 +160,17 @@ class SpatialKinematics(Kinematics):
         turn = (_turns(one[:, 3:]).inv() * _turns(two[:, 3:])).as_rotvec()
         return np.hstack([two[:, :3] - one[:, :3], turn]).reshape(len(after), -1)
 
-    def headings(self, home: FloatArray, up: FloatArray, q: FloatArray, stated: FloatArray) -> Headings:
+    def headings(self, home: FloatArray, vertical: FloatArray, q: FloatArray, stated: FloatArray) -> Headings:
         """How far bodies have turned about a direction u since others: the twist of the turn (w, x) between them.
 
         That is 2 atan(s / w) with s = x . u; the rest of the turn is about an axis across u. A small turn d in global
         axes changes it by d . (w^2 u + w x times u + s x) / (w^2 + s^2), and d = u leaves the rest as it is.
         """
-        size = float(np.linalg.norm(up))
+        size = float(np.linalg.norm(vertical))
         # at home the body's principal axes stand as `home` has them: all turns are seen from there
         now, before = (_turns(each.reshape(-1, COORDINATES)[:, 3:]) for each in (q, stated))
         axes = home[: len(now), spatial_poses.HOME_TURN : spatial_poses.HOME_AXES].reshape(-1, 3, 3)
-        u = np.einsum("bij,i->bj", axes, up / size if size > 0.0 else up)
+        u = np.einsum("bij,i->bj", axes, vertical / size if size > 0.0 else vertical)
         turn = (now * before.inv()).as_quat(canonical=True)
         x, w = turn[:, :3], turn[:, 3:]
         s = np.sum(x * u, axis=1, keepdims=True)
