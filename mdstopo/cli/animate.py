@@ -54,8 +54,8 @@ def command(
         name = load_case or source.load_cases[0]
         if name not in source.load_cases:
             raise click.BadParameter(f"no load case {name!r}; there are {', '.join(source.load_cases)}")
-        place = made_from(source.view, out or result_path.with_suffix(".gif"))
-        write_motion(module, source, place, name, frames, seconds)
+        place = out or result_path.with_suffix(".gif")
+        write_motion(module, source, made_from(source.view, place), name, frames, seconds)
     output.say(str(place))
     output.document({"command": "animate", "result": str(result_path), "picture": str(place), "load_case": name})
     return 0

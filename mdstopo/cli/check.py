@@ -229,7 +229,7 @@ def _say_contacts(output: Output, case: "Case") -> None:
         if isinstance(contact, SurfaceContact):
             on = f"the {contact.surface.shape} of {on}{', inside' if contact.surface.hollow else ''}"
         rows.append([contact.name, contact.body, on, str(len(own)), inside])
-    output.say(f"{len(case.contacts)} contacts")
+    output.say(counted(len(case.contacts), "contact"))
     output.table(rows)
 
 

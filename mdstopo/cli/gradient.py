@@ -224,7 +224,14 @@ def _difference(
     results: dict[str, dict[str, Any]],
     datasets: dict[str, Any],
 ) -> str:
-    """Add differences of some members to the results; why there are none, where there are none."""
+    """Add differences of some members to the results; why there are none, where there are none.
+
+    engine: the evaluator that the results are of.
+    case, alpha: the case and the design (N + P,).
+    count: for how many members, and for how many values of variables.
+    results: by method, what it has found.
+    datasets: of the result file; differences are added.
+    """
     import numpy as np
 
     from mdstopo.case.methods.integrators import AUTO, INTEGRATORS

@@ -1,5 +1,6 @@
 """How a run shows that it is going: a live line on a terminal, now and then a plain one elsewhere."""
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -56,9 +57,14 @@ def line(progress: "Progress") -> str:
     start = f"start {progress.start + 1}/{progress.starts}, " if progress.starts > 1 else ""
     return (
         f"{start}iteration {progress.iteration}/{progress.max_iterations}: "
-        f"objective {number(progress.objective, 7)}, best {number(progress.best, 7)}, "
+        f"objective {_objective(progress)}, best {number(progress.best, 7)}, "
         f"constraint {number(progress.violation, 3)}, change {number(progress.change, 3)}"
     )
+
+
+def _objective(progress: "Progress") -> str:
+    """The value of the iterate, or that it has none."""
+    return "none (failed)" if math.isnan(progress.objective) else number(progress.objective, 7)
 
 
 class Plain(displays.Plain["Progress"]):
@@ -99,7 +105,7 @@ class Live(displays.Live["Progress"]):
         names = ["iteration", "objective", "best", "constraint", "change", ""]
         values = [
             f"{progress.iteration}/{progress.max_iterations}",
-            number(progress.objective, 7),
+            _objective(progress),
             number(progress.best, 7),
             number(progress.violation, 3),
             number(progress.change, 3),

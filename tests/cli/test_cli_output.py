@@ -98,6 +98,11 @@ def test_several_starts_are_counted() -> None:
     assert line(progress()).startswith("iteration 3/10")
 
 
+def test_progress_says_that_an_iterate_has_no_value() -> None:
+    assert "objective none (failed), best" in line(progress(objective=float("nan")))
+    assert "nan" not in line(progress(objective=float("nan")))
+
+
 def test_a_condensed_history_has_both_ends_and_few_rows() -> None:
     for count in (1, 2, 11, 12, 13, 51, 1000):
         rows = condensed(count)

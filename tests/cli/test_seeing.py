@@ -35,6 +35,12 @@ def results(tmp_path_factory):
     return made
 
 
+def test_a_written_film_is_named_by_the_path_that_was_given(results, monkeypatch, capsys):
+    monkeypatch.chdir(results["run"].parent)
+    assert run_group(["animate", results["run"].name, "--out", "short.svg", "--frames", "2"]) == 0
+    assert capsys.readouterr().out == "short.svg\n"
+
+
 def test_an_svg_moves_its_lines_from_the_first_state_to_the_last(results, tmp_path):
     out = tmp_path / "motion.svg"
     assert run_group(["animate", str(results["run"]), "--out", str(out), "--frames", "5", "--quiet"]) == 0

@@ -9,14 +9,15 @@ next one as far back, for ever: each ends at the latest where no force along it 
 continuous this finds a minimum (J.-S. Pang and L. Qi 1995, "A globally convergent Newton method for convex SC1
 minimization problems"). It depends on the design, alpha and the values p of laws' variables, by
 K dq + Phi_q^T dlam = dF, Phi_q dq = 0: `inverse` is that linear map.
-Every search begins at the stated configuration, whatever was found before; and again where free turns were turned back.
+Every search begins at the stated configuration, whatever was found before. What moves freely is moved back
+(`free_motions`), and the search goes on from there.
 """
 
 from typing import Any
 
 import numpy as np
 
-from mdstopo.general.at_rest.free_turns import FreeTurns, free_turns
+from mdstopo.general.at_rest.free_motions import FreeMotions, free_motions
 from mdstopo.general.driver_interface import DriverWithStart
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray
@@ -35,8 +36,9 @@ BACK, TRIALS = 0.1, 30
 NEAR, ARRIVED = 1e-6, 1e-13
 #: stiffness, relative to the largest, below which a direction counts as free
 FREE = 1e-9
-#: how often what turns freely is turned back at most, and how far from its heading it is then at most, rad
-TURNS_BACK, HEADING = 80, 1e-12
+#: how often what moves freely is moved back at most, and how far from its place or heading it is then at most, relative
+#: to the scene
+RETURNS, KEPT = 80, 1e-12
 
 
 def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:
@@ -46,21 +48,22 @@ def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: flo
     """
     bodies, names = driver.scene.kinematics, driver.scene.bodies
     scene = _AtRest(driver, alpha, size)
-    q, turning = q0, 0
-    for _ in range(TURNS_BACK):
+    q, back = q0, np.zeros(len(scene.force))
+    for _ in range(RETURNS):
         q, found = _equilibrium(scene, q, q0, size)
+        change = bodies.difference(q, q0)
         if not found or scene.pushed():
-            return _nowhere(driver, bodies.difference(q, q0), scene.arms)
-        free = scene.free_turns(q, q0)
+            return _nowhere(driver, change, scene.arms)
+        free = scene.free_motions(q, q0, change)
         if isinstance(free, int):
-            turning = free
-            break
-        if np.abs(free.angles).max(initial=0.0) <= HEADING:
-            return _settled(driver, q, bodies.difference(q, q0), free.kept(scene.inverse()))
-        turning = free.bodies[int(np.abs(free.angles).argmax())]
+            return f"body {names[free]} is free to turn, so that its equilibrium is not determined"
         back = free.back()
-        q = bodies.retract(q, min(1.0, FAR * size / scene.extent(back)) * back)
-    return f"body {names[turning]} is free to turn, so that its equilibrium is not determined"
+        far = scene.extent(back)
+        if far <= KEPT * size:
+            return _settled(driver, q, change, free.kept(scene.inverse()))
+        q = bodies.retract(q, min(1.0, FAR * size / far) * back)
+    body = names[_farthest(driver, back, scene.arms)]
+    return f"body {body} is free to move, and finds no static equilibrium with its stated place or heading"
 
 
 def _settled(driver: DriverWithStart, q: FloatArray, change: FloatArray, inverse: FloatArray) -> Settled:
@@ -151,9 +154,13 @@ def _stepped(
 
 def _nowhere(driver: DriverWithStart, shift: FloatArray, arms: FloatArray) -> str:
     """Why there is no equilibrium: the body that has moved most by a shift (n,), with angles times arms (n,)."""
-    far = np.abs(shift * arms).reshape(-1, driver.scene.kinematics.freedoms).max(axis=1)
-    body = driver.scene.bodies[int(far.argmax())]
+    body = driver.scene.bodies[_farthest(driver, shift, arms)]
     return f"body {body} finds no static equilibrium near its stated place"
+
+
+def _farthest(driver: DriverWithStart, shift: FloatArray, arms: FloatArray) -> int:
+    """The body that a shift (n,), with angles times arms (n,), moves most."""
+    return int(np.abs(shift * arms).reshape(-1, driver.scene.kinematics.freedoms).max(axis=1).argmax())
 
 
 class _AtRest:
@@ -247,15 +254,16 @@ class _AtRest:
         scale = self.rate() * self._size * float(self._root.max(initial=0.0))
         return bool(modes.size) and float(np.abs(modes.T @ self.pull).max()) > FREE * scale
 
-    def free_turns(self, q: FloatArray, stated: FloatArray) -> FreeTurns | int:
-        """What turns freely at q (n_q,); or a body that turns so where it has no heading."""
+    def free_motions(self, q: FloatArray, stated: FloatArray, change: FloatArray) -> FreeMotions | int:
+        """What moves freely at q (n_q,), a change (n,) from the stated place; or a body that turns so where it has no
+        heading."""
         null = self._null()
         modes, root = np.zeros((len(self.force), null.shape[1])), np.ones(len(self.force))
         modes[self.free], root[self.free] = null, self._root
         scene = self._driver.scene
         vertical = np.asarray(scene.load_case.gravity, dtype=np.float64)
         headings = self.bodies.headings(scene.model.home, vertical, q, stated)
-        return free_turns(self.bodies, modes, root, headings)
+        return free_motions(self.bodies, modes, root, change, headings)
 
     def extent(self, step: FloatArray) -> float:
         """How far a step (n,) goes: the largest shift of a centre, or angle times the scene's size, m."""

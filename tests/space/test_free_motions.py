@@ -121,3 +121,34 @@ def test_headings_and_their_slopes_are_those_of_the_turn_between_two_attitudes()
             step[6 * body + 3 + k] = 1e-4
             slope = (8.0 * (angles(step) - angles(-step)) - (angles(2 * step) - angles(-2 * step))) / 12e-4
             assert abs(slope[body] - found.slope[body, k]) < 1e-11
+
+
+#: a crate between straps that are just not taut, and a spring that pulls it down askew
+LASHED = """
+format: 1
+dimension: 3
+time: {end: 0.02}
+gravity: [0, 0, -9.81]
+bodies:
+  crate: {mass: 100, inertia: [12, 10, 14], position: [0.1, 0.05, 0.5]}
+points:
+  feet: {body: crate, frame: global, grid: {list: [[0.6, 0.5, 0], [0.5, -0.5, 0], [-0.5, 0.5, 0], [-0.5, -0.5, 0]]}}
+  roof: {body: crate, frame: global, grid: {list: [[0.6, 0.5, 1], [0.5, -0.5, 1], [-0.5, 0.5, 1]]}}
+  rings: {body: ground, grid: {list: [[1.2, 0.7, 0], [0.8, -1.1, 0], [-1.3, 0.4, 0.2]]}}
+contacts:
+  - {points: feet, on: {body: ground, plane: {at: [0, 0, 0], normal: [0, 0, 1]}}, stiffness: 20000}
+members:
+  straps: {from: roof, to: rings, connect: pairs, law: {type: gap, stiffness: 2.0e+5, gap: 0}}
+objectives:
+  x: {response: {displacement: {body: crate, component: x}}, over_time: final}
+solver: {settle: true, tolerance: 1.0e-10}
+"""
+
+
+def test_straps_that_pull_on_the_way_alone_do_not_move_a_load_or_turn_it() -> None:
+    """They are as long as they are without force at the start, and slack once the crate has sunk."""
+    case = read_case(LASHED)
+    q = mdstopo.simulate(case, np.array([1.0, 0.4, 0.7])).q[0]
+    assert q[2] < 0.5 - 1e-3
+    assert np.abs(q[:2] - [0.1, 0.05]).max() < 1e-12
+    assert abs(twist(Rotation.from_quat(q[3:7], scalar_first=True))) < 1e-12
