@@ -193,6 +193,7 @@ def _build(
 ) -> dict[str, Any]:
     """The parts of the case, as far as they can be made; notes every mistake on the way.
 
+    top: the file's keys as they were read, of a root; geometry: of the plane or of space; reading: takes the mistakes.
     written: the whole case with its expressions, which are numbers in root. varies: whether what varies is read.
     """
     declare_joints(top["joints"], reading)
