@@ -295,6 +295,13 @@ def test_prices_know_members_that_switch_in_a_step_that_another_one_has_cut_shor
     assert Priced(SWITCHED["clipped"], 0.01).error <= 5e-7
 
 
+def test_prices_know_that_members_with_a_plateau_at_a_hundredth_of_a_millimetre_open_once_they_are_crushed():
+    """Their elastic phase is over between two nodes of a step. It begins at the plateau, to rounding."""
+    law = {"type": "crush", "stiffness": 48000, "force": 1.6, "side": "compression", "gap": 0.03}
+    scene = Priced(arm(law, **looked(PULL, "max")))
+    assert scene.error <= 1e-7
+
+
 def test_virtual_changes_within_a_step_add_up_to_what_its_stages_give_however_short_it_is():
     """Crushable legs with ends within 1e-7 m of each other switch one right behind the other."""
     law = {"type": "crush", "stiffness": 3600, "force": 21, "side": "compression"}
