@@ -100,7 +100,11 @@ class CandidatePass(ABC, Generic[A]):
         return SMOOTH_ERROR
 
     def prices(self, states: A, i: IndexArray, j: IndexArray) -> FloatArray:
-        """The derivatives (K,) by alpha of members from points P (K,) to points Q (K,)."""
+        """The derivatives (K,) by alpha of members from points P (K,) to points Q (K,).
+
+        They are those of candidates that are not built. Rows that tell the force of one member, of a built one, have
+        more of it in their gradient: its own force.
+        """
         return self.prices_between(states, *(i, j)[self.order])
 
     def go_through(self, states: A, worth: float, most: int) -> Passed:

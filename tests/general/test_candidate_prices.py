@@ -293,6 +293,66 @@ def test_prices_know_members_that_switch_in_a_step_that_another_one_has_cut_shor
     assert Priced(SWITCHED["clipped"], 0.01).error <= 5e-7
 
 
+def test_prices_know_that_members_with_a_plateau_at_a_hundredth_of_a_millimetre_open_once_they_are_crushed():
+    """Their elastic phase is over between two nodes of a step. It begins at the plateau, to rounding."""
+    law = {"type": "crush", "stiffness": 48000, "force": 1.6, "side": "compression", "gap": 0.03}
+    scene = Priced(arm(law, **looked(PULL, "max")))
+    assert scene.error <= 1e-7
+
+
+def test_prices_of_legs_whose_ends_pass_through_each_other_come_to_a_closed_form_with_the_step(monkeypatch):
+    """A body glides past with 1 m/s: its legs are pushed together to their plateau, to no length at all, and recover
+    behind. No other force acts, and one at t moves the place at the end by (end - t) / mass."""
+    monkeypatch.setattr(candidates, "START_SET", 1)
+    stiffness, force, mass, end = 900.0, 40.0, 2.0, 0.3
+    scene = {
+        "time": {"end": end},
+        "bodies": {"foot": {"mass": mass, "inertia": 0.1, "position": [0, 0], "velocity": [1, 0]}},
+        "points": {
+            "p": {"body": "foot", "grid": {"line": {"from": [0.1, 0], "to": [0.11, 0], "count": 16}}},
+            "q": {"body": "ground", "grid": {"line": {"from": [0.25, 0], "to": [0.26, 0], "count": 128}}},
+        },
+        "members": {
+            "web": {
+                "from": "p", "to": "q", "candidates": "priced",
+                "law": {"type": "crush", "stiffness": stiffness, "force": force, "side": "compression"},
+            },
+        },
+        "design": {"initial": 0, "lower": 0},
+        "objectives": {"G": {"response": {"displacement": {"body": "foot", "component": "x"}}, "over_time": "final"}},
+    }  # fmt: skip
+    i, j = np.divmod(np.arange(16 * 128), 128)
+    meet = np.linspace(0.25, 0.26, 128)[j] - np.linspace(0.1, 0.11, 16)[i]
+    full = force / stiffness
+
+    def moved(begin, stop, level, slope):
+        """By a force level + slope t from begin to stop."""
+        at = [end * level * t + (end * slope - level) * t**2 / 2 - slope * t**3 / 3 for t in (begin, stop)]
+        return (at[1] - at[0]) / mass
+
+    exact = moved(0.0, full, 0.0, -stiffness) + moved(full, meet, -force, 0.0)
+    exact += moved(meet, meet + full, force + stiffness * meet, -stiffness)
+
+    def off(step):
+        """How far prices and the gradient of some of the members are from it, relative to the largest."""
+        solver = {"step": step, "integrator": "runge_kutta"}
+        case = read_case(json.dumps({"format": 1, **scene, "solver": solver}))
+        evaluator = Evaluator(case)
+        problem = evaluator.problem()
+        evaluation = problem.evaluation(np.zeros(case.n_design))
+        (sign,) = np.sign(problem.sample_of(evaluation).rows)
+        prices = evaluator.candidates_of(case.members[0]).prices(problem.pricing_states(evaluation, [1.0]), i, j)
+        some = slice(None, None, 16)
+        whole = with_members(case, {"web": (i[some], j[some])})
+        (gradient,) = Evaluator(whole).problem().evaluate(np.zeros(whole.n_design)).gradients
+        errors = np.abs(sign * prices - exact).max(), np.abs(sign * gradient - exact[some]).max()
+        return np.array(errors) / np.abs(exact).max()
+
+    assert (off(0.01) <= [5e-2, 6e-3]).all()
+    assert (off(0.00125) <= [7e-3, 7e-4]).all()
+    assert (off(0.0003125) <= [2e-3, 3e-4]).all()
+
+
 def test_virtual_changes_within_a_step_add_up_to_what_its_stages_give_however_short_it_is():
     """Crushable legs with ends within 1e-7 m of each other switch one right behind the other."""
     law = {"type": "crush", "stiffness": 3600, "force": 21, "side": "compression"}

@@ -33,7 +33,8 @@ ANY_PIECE = 0
 #: a margin below this leaves open in which mode a member begins, and its second derivative decides (m, m/s or a part)
 CLOSE = 1e-6
 #: a mode is over where its margin is below zero by more than rounding, this part of 1 m and the member's length: right
-#: behind a switch the margin of the new mode is zero, and nodes there would end it again
+#: behind a switch the margin of the new mode is zero, and it would end again at once. What has just been crushed stands
+#: at its plateau, from which it moves away
 ROUNDING = 4e-15
 
 
@@ -54,7 +55,7 @@ def degree_of(stages, length, reach):
 
 
 @part
-def _first_over(code, p, curves, rest, time, node, begin, mode, kept):
+def _first_over(code, p, curves, rest, time, node, begin, mode, kept, over):
     """The first node behind a fraction of a step at which a mode has ended; NODES where it has at none.
 
     code, p (8,), curves, rest: the law, numbers of all laws, and the member's free length (m).
@@ -62,8 +63,8 @@ def _first_over(code, p, curves, rest, time, node, begin, mode, kept):
     node (NODE_ROWS, NODES): the member there, of which ELONGATION and RATE count.
     begin: the fraction.
     mode, kept: the mode, and the permanent set (m).
+    over: the margin below which it has ended, less than zero.
     """
-    over = -ROUNDING * (1.0 + rest + abs(node[ELONGATION, 0]))
     for m in range(1, NODES):
         if NODE[m] > begin:
             t = time[0] + NODE[m] * time[1]
@@ -115,7 +116,7 @@ def _margin(code, p, curves, rest, time, power, c, mode, kept):
 
 
 @part
-def _located(code, p, curves, rest, time, power, lower, upper, mode, kept):
+def _located(code, p, curves, rest, time, power, lower, upper, mode, kept, end):
     """The fraction of a step at which a mode has just ended.
 
     Regula falsi, which halves the value at an end that stays (Illinois), and the interval where three turns have not
@@ -125,9 +126,10 @@ def _located(code, p, curves, rest, time, power, lower, upper, mode, kept):
     time (2,): start and length of the step (s). power (NODE_ROWS, NODES): coefficients of ELONGATION and RATE.
     lower, upper: fractions at which the mode has not ended, and has.
     mode, kept: the mode, and the permanent set (m).
+    end: the margin at which it ends, zero or less.
     """
-    before = _margin(code, p, curves, rest, time, power, lower, mode, kept)
-    behind = _margin(code, p, curves, rest, time, power, upper, mode, kept)
+    before = _margin(code, p, curves, rest, time, power, lower, mode, kept) - end
+    behind = _margin(code, p, curves, rest, time, power, upper, mode, kept) - end
     turn = 0
     side = 0
     halve = False
@@ -137,7 +139,7 @@ def _located(code, p, curves, rest, time, power, lower, upper, mode, kept):
         if halve or not lower <= c <= upper:
             c = 0.5 * (lower + upper)
         c = min(max(c, lower + 0.5 * LOCATED), upper - 0.5 * LOCATED)
-        value = _margin(code, p, curves, rest, time, power, c, mode, kept)
+        value = _margin(code, p, curves, rest, time, power, c, mode, kept) - end
         if value < 0.0:
             upper = c
             behind = value
@@ -176,13 +178,14 @@ def follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
     pieces[0, BEGIN] = 0.0
     pieces[0, PIECE_MODE] = mode
     pieces[0, PIECE_SET] = kept
+    over = -ROUNDING * (1.0 + rest + abs(node[ELONGATION, 0]))
     last = np.int64(0)
     while True:
         begin = pieces[last, BEGIN]
         mode = np.int64(pieces[last, PIECE_MODE])
         kept = pieces[last, PIECE_SET]
-        over = _first_over(code, p, curves, rest, time, node, begin, mode, kept)
-        if over == NODES:
+        ended = _first_over(code, p, curves, rest, time, node, begin, mode, kept, over)
+        if ended == NODES:
             return last
         if last == CHANGES:
             if law_has_pieces(code):
@@ -191,10 +194,13 @@ def follow(code, p, curves, rest, time, mode, kept, node, power, pieces):
         if last == 0:
             fill_power(node[ELONGATION], power[ELONGATION])
             fill_power(node[RATE], power[RATE])
-        lower = max(begin, NODE[over - 1])
-        upper = NODE[over]
-        if _margin(code, p, curves, rest, time, power, lower, mode, kept) >= 0.0:
-            upper = _located(code, p, curves, rest, time, power, lower, upper, mode, kept)
+        lower = max(begin, NODE[ended - 1])
+        upper = NODE[ended]
+        before = _margin(code, p, curves, rest, time, power, lower, mode, kept)
+        if before >= 0.5 * over:
+            # a margin that is below zero by rounding alone has not ended the mode
+            end = 0.0 if before >= 0.0 else 0.5 * over
+            upper = _located(code, p, curves, rest, time, power, lower, upper, mode, kept, end)
         else:
             upper = lower
         x = polynomial(power[ELONGATION], upper) - kept
