@@ -248,3 +248,19 @@ def test_the_command_says_how_far_the_start_has_moved(tmp_path):
 def test_frequencies_are_those_about_the_equilibrium():
     case = read_case(HANGS)
     assert Evaluator(case).natural_frequencies(np.array([0.8]), "default") == pytest.approx([np.sqrt(400.0 / 2.0)])
+
+
+def test_what_a_strap_has_pulled_until_it_is_slack_stays_there():
+    text = """
+format: 1
+time: {end: 0.1}
+bodies: {cart: {mass: 3, inertia: 1, position: [0, 0]}}
+joints: [{type: prismatic, bodies: [ground, cart], at: [0, 0], axis: [1, 0]}]
+members:
+  strap: {from: {body: ground, at: [-2, 0]}, to: {body: cart, at: [0, 0]}, law: {type: gap, stiffness: 5000, gap: GAP,
+    free_length: 1.9}}
+solver: {settle: true}
+"""
+    for gap in (0.0, 0.01, 0.03, 0.07):
+        motion = mdstopo.simulate(read_case(text.replace("GAP", str(gap))))
+        assert abs(motion.q[0, 0] + 0.1 - gap) < 1e-12
