@@ -12,6 +12,8 @@ from mdstopo.general.responses.extremes import VALUE
 #: steps that end where they do for the sake of integrals alone, from which on it is told, and how many times as many
 #: they are as the others
 MANY, TIMES = 500, 4
+#: expressions that have a small amount more than a response, and the like of its square
+ADDED, SQUARED = "x + 1e-3", "sqrt(x^2 + 1e-6)"
 
 
 def near_zero(case: Case, engine: object) -> str:
@@ -34,10 +36,12 @@ def near_zero(case: Case, engine: object) -> str:
         if asked < MANY or asked < TIMES * others:
             continue
         found = [f"{_words(case, aim)} is {driver.rows[j, 0, VALUE]:.2g} {unit_of_value(aim)}" for j, aim in integrals]
+        # of a mean square the least value stays where it is if the squares have an amount more
+        formula = SQUARED if any(REDUCTIONS[aim.over_time].is_squared for _, aim in integrals) else ADDED
         return (
             f"{' and '.join(found)}: an integral so near to zero takes {driver.count:,} steps where the motion takes "
             f"{max(others, 1):,}, because solver.tolerance is relative to it; where less than some amount is as good "
-            "as nothing, add that to the response by an expression (formula: x + 1e-3), or loosen solver.tolerance"
+            f"as nothing, add that to the response by an expression (formula: {formula}), or loosen solver.tolerance"
         )
     return ""
 

@@ -6,7 +6,7 @@ import pytest
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.session import run_session
-from mdstopo.session.near_zero import near_zero
+from mdstopo.session.near_zero import ADDED, SQUARED, near_zero
 from mdstopo.starts.callbacks import ignore, never
 
 #: a lamp that hangs still below the hook of a hull that goes up and down; what it sways by is rounding
@@ -32,8 +32,8 @@ solver: {tolerance: 1e-6}
 SWAY = "{displacement: {body: lamp, relative_to: hull}}"
 
 
-def told(response: str) -> tuple[str, int]:
-    case = read_case(LAMP.replace("RESPONSE", response))
+def told(response: str, over_time: str = "mean") -> tuple[str, int]:
+    case = read_case(LAMP.replace("RESPONSE", response).replace("over_time: mean", f"over_time: {over_time}"))
     engine = Evaluator(case, in_background=False)
     found = engine.evaluate(case.start, gradient=False)
     return near_zero(case, engine), found.work["steps"]
@@ -46,9 +46,11 @@ def test_an_integral_next_to_nothing_is_named_with_what_it_costs_and_what_helps(
     assert "add that to the response by an expression" in sentence
 
 
-def test_what_is_advised_helps() -> None:
-    slow = told(SWAY)[1]
-    sentence, fast = told(f"{{expression: {{formula: x + 1e-3, unit: m, of: {{x: {SWAY}}}}}}}")
+@pytest.mark.parametrize(("over_time", "formula"), [("mean", ADDED), ("rms", SQUARED)])
+def test_what_is_advised_helps(over_time: str, formula: str) -> None:
+    advice, slow = told(SWAY, over_time)
+    assert f"(formula: {formula})" in advice
+    sentence, fast = told(f"{{expression: {{formula: {formula}, unit: m, of: {{x: {SWAY}}}}}}}", over_time)
     assert sentence == ""
     assert fast < 0.1 * slow
 
