@@ -97,7 +97,7 @@ class DesignProblem:
             or any(not kind_of(objective.response).is_energy for objective in self._objectives)
         )
         #: no U is below it
-        self.objective_bound = bound_of(self._objectives[0]) if one else -np.inf
+        self.objective_bound = lower_bound_of(self._objectives[0]) if one else -np.inf
         aims: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
         members = any(kind_of(each.response).of_members for each in aims)
         # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
@@ -340,7 +340,7 @@ def sign_of(objective: Objective) -> float:
     return -1.0 if objective.sense == "maximize" else 1.0
 
 
-def bound_of(objective: Objective) -> float:
+def lower_bound_of(objective: Objective) -> float:
     """What an objective cannot be below, with the sign with which it is minimised: 0 of a length, a magnitude or a mean
     square, else -inf."""
     response = objective.response

@@ -193,8 +193,9 @@ def _build(
 ) -> dict[str, Any]:
     """The parts of the case, as far as they can be made; notes every mistake on the way.
 
-    top: the file's keys as they were read, of a root; geometry: of the plane or of space; reading: takes the mistakes.
-    written: the whole case with its expressions, which are numbers in root. varies: whether what varies is read.
+    top: the keys of the file as they were read. root: the file, with numbers in the place of expressions; written: with
+    its expressions. geometry: of the plane or of space. varies: whether design variables are read. reading: takes the
+    mistakes.
     """
     declare_joints(top["joints"], reading)
     _check_references(top, reading)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mdstopo.case.model import Case
-    from mdstopo.cli.gradient_numbers import Reach
+    from mdstopo.cli.gradient_numbers import DifferenceSteps
     from mdstopo.engine import Evaluator
     from mdstopo.evaluation import Evaluation
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 USUAL = (DEFAULT_SENSITIVITY, having("of_histories")[0])
 _TIGHT = 1e-12  # solver tolerance for differences: what the integrator leaves of noise is divided by the step
 _SHOWN = 6  # values of a variable that are shown
-_OFF = 1e-6  # from where on a difference from differences is looked into
+_OFF = 1e-6  # relative difference from differences above which it is told whether another peak explains it
 
 
 @click.command("gradient")
@@ -235,7 +235,7 @@ def _difference(
     import numpy as np
 
     from mdstopo.case.methods.integrators import AUTO, INTEGRATORS
-    from mdstopo.cli.gradient_numbers import chosen_members, differences, ranges, reach_of, value_differences
+    from mdstopo.cli.gradient_numbers import chosen_members, difference_steps, differences, ranges, value_differences
     from mdstopo.evaluators import evaluator_of
 
     members = chosen_members(case.n_design, count, case.optimizer.seed)
@@ -272,16 +272,16 @@ def _difference(
             whole[case.n_design + places] = values / ranges(case)[places]
             named = case.space.named(whole)
             datasets |= {f"differences/variables/{name}/{variable}": each for variable, each in named.items()}
-    _look_into_differences(engine, alpha, reach_of(case, alpha, members, places), results)
+    _note_other_peaks(engine, alpha, difference_steps(case, alpha, members, places), results)
     return ""
 
 
-def _look_into_differences(
-    engine: "Evaluator", alpha: "NDArray[np.float64]", reach: "Reach", results: dict[str, dict[str, Any]]
+def _note_other_peaks(
+    engine: "Evaluator", alpha: "NDArray[np.float64]", steps: "DifferenceSteps", results: dict[str, dict[str, Any]]
 ) -> None:
     """Note with the first method where differences are off because another peak becomes decisive within a step.
 
-    reach: where differences have looked.
+    steps: of the differences.
     """
     from mdstopo.cli.gradient_numbers import changes_peak
     from mdstopo.design_problem import ALL
@@ -292,7 +292,7 @@ def _look_into_differences(
     found = engine.evaluate(alpha, sensitivity=method, rows=Rows(*ALL)) if off else None
     if found is None or not found.status.usable:
         return
-    tied = [name for name in off if changes_peak(found.peaks[name], reach)]
+    tied = [name for name in off if changes_peak(found.peaks[name], steps)]
     if tied:
         why = (
             f"of {', '.join(tied)} another peak becomes decisive within a step of the differences, which are no "

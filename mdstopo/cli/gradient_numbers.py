@@ -71,12 +71,18 @@ def value_differences(
     if not len(places):
         return {}
     n, width = case.n_design, ranges(case)
-    low = np.concatenate([np.full(each.count, each.lower) for each in case.variables])
+    low, start = _shares(case, design)
 
     def of_shares(shares: Floats) -> Mapping[str, float]:
         return objectives(np.concatenate([design[:n], low + shares * width]))
 
-    return differences(of_shares, (design[n:] - low) / width, places, 1.0)
+    return differences(of_shares, start, places, 1.0)
+
+
+def _shares(case: "Case", design: Floats) -> tuple[Floats, Floats]:
+    """The lower bounds (P,) of the values of variables, and what share of its range each has above that."""
+    low = np.concatenate([np.full(each.count, each.lower) for each in case.variables] or [np.zeros(0)])
+    return low, (design[case.n_design :] - low) / ranges(case)
 
 
 def differences(
@@ -126,27 +132,28 @@ def _step(alpha: Floats, member: int, size: float | None) -> float:
     return min(step, 0.5 * here) if here > 0.0 else step
 
 
-class Reach(NamedTuple):
-    """Where differences look: places (K,) in the whole design (N + P,), the longest step (K,) by each in its own unit,
-    and whether steps are taken to both sides (K,)."""
+class DifferenceSteps(NamedTuple):
+    """What differences are taken by: places (K,) in the whole design (N + P,), the longest step (K,) of each in its own
+    unit, and whether steps are taken to both sides (K,)."""
 
     places: NDArray[np.intp]
-    steps: Floats
+    longest: Floats
     both: NDArray[np.bool_]
 
 
-def reach_of(case: "Case", design: Floats, members: NDArray[np.intp], values: NDArray[np.intp]) -> Reach:
-    """Where `differences` by members and `value_differences` by values look, from a design (N + P,)."""
+def difference_steps(
+    case: "Case", design: Floats, members: NDArray[np.intp], values: NDArray[np.intp]
+) -> DifferenceSteps:
+    """The steps of `differences` by members and of `value_differences` by values, from a design (N + P,)."""
     n, width = case.n_design, ranges(case)
-    low = np.concatenate([np.full(each.count, each.lower) for each in case.variables] or [np.zeros(0)])
-    shares = (design[n:] - low) / width
+    _, shares = _shares(case, design)
     by_members = [_step(design[:n], int(member), None) for member in members]
     by_values = [_step(shares, int(value), 1.0) * width[value] for value in values]
     both = np.concatenate([design[members] > 0.0, shares[values] > 0.0])
-    return Reach(np.concatenate([members, n + values]), np.array([*by_members, *by_values]), both)
+    return DifferenceSteps(np.concatenate([members, n + values]), np.array([*by_members, *by_values]), both)
 
 
-def changes_peak(peaks: "Sequence[Peak]", reach: Reach) -> bool:
+def changes_peak(peaks: "Sequence[Peak]", steps: DifferenceSteps) -> bool:
     """Whether a step of differences makes another peak decisive than the first one.
 
     peaks: those that compete, the decisive one first, with gradients by the whole design.
@@ -156,8 +163,8 @@ def changes_peak(peaks: "Sequence[Peak]", reach: Reach) -> bool:
         if first.gradient is None or other.gradient is None:
             continue
         gap = first.value - other.value
-        nearer = (other.gradient - first.gradient)[reach.places] * (reach.steps if gap >= 0.0 else -reach.steps)
-        overtakes = np.where(reach.both | (gap == 0.0), np.abs(nearer), nearer)
+        nearer = (other.gradient - first.gradient)[steps.places] * (steps.longest if gap >= 0.0 else -steps.longest)
+        overtakes = np.where(steps.both | (gap == 0.0), np.abs(nearer), nearer)
         if overtakes.max(initial=0.0) > abs(gap):
             return True
     return False

@@ -6,6 +6,7 @@ import math
 import re
 import xml.etree.ElementTree as Xml
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import chain, pairwise
 from pathlib import Path
 
@@ -29,6 +30,17 @@ class ImportedError(ValueError):
     """The file cannot be taken; a sentence that says why. `exit_status` as of a bad case."""
 
     exit_status = 2
+
+
+@contextmanager
+def mistakes_in(place: str) -> Iterator[None]:
+    """Tell values that cannot be read with the place in which they stand; what has been told already stays."""
+    try:
+        yield
+    except ImportedError:
+        raise
+    except ValueError as error:
+        raise ImportedError(f"{place}: {error}") from None
 
 
 def points_in(path: Path, data: str) -> tuple[Layers, float | None]:
@@ -83,10 +95,8 @@ def _dxf(data: str, path: Path) -> tuple[Layers, float | None]:
         pairs = [(int(code), value) for code, value in zip(lines[::2], lines[1::2], strict=False)]
     except ValueError as error:
         raise ImportedError(f"{path}: this is no DXF: {error}") from None
-    try:
-        return _dxf_layers(pairs), _dxf_unit(pairs, path)
-    except ValueError as error:
-        raise ImportedError(str(error) if isinstance(error, ImportedError) else f"{path}: {error}") from None
+    with mistakes_in(f"{path}"):
+        return _dxf_layers(pairs), _dxf_unit(pairs)
 
 
 def _dxf_layers(pairs: list[tuple[int, str]]) -> Layers:
@@ -99,13 +109,11 @@ def _dxf_layers(pairs: list[tuple[int, str]]) -> Layers:
     return layers
 
 
-def _dxf_unit(pairs: list[tuple[int, str]], path: Path) -> float | None:
+def _dxf_unit(pairs: list[tuple[int, str]]) -> float | None:
     """Metres in the file's unit, None where it does not say."""
     unit = next((int(value) for (code, name), (_, value) in pairwise(pairs) if (code, name) == (9, "$INSUNITS")), 0)
     if unit and unit not in DXF_UNITS:
-        raise ImportedError(
-            f"{path}: its unit is number {unit} of DXF, which is not known here; save it in another one"
-        )
+        raise ValueError(f"its unit is number {unit} of DXF, which is not known here; save it in another one")
     return DXF_UNITS.get(unit)
 
 
@@ -149,10 +157,8 @@ def _svg_node(node: Xml.Element, name: str, layers: Layers, path: Path) -> None:
         raise ImportedError(f"{path}: {kind} {name!r} has a transform, which is not read; ungroup or flatten it first")
     if kind in ("defs", "clipPath", "mask", "symbol"):
         return
-    try:
+    with mistakes_in(f"{path}: {kind} {name!r}"):
         layers.setdefault(name, []).extend(_svg_points(kind, node))
-    except ValueError as error:
-        raise ImportedError(f"{path}: {kind} {name!r}: {error}") from None
     for child in node:
         _svg_node(child, name, layers, path)
 

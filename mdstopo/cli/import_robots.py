@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.geometry.start_rotations import about_axis
-from mdstopo.cli.import_points import ImportedError
+from mdstopo.cli.import_points import ImportedError, mistakes_in
 
 Floats = NDArray[np.float64]
 Plain = dict[str, Any]
@@ -97,12 +97,8 @@ def robot_in(path: Path, data: str, fixed: bool = False) -> tuple[Plain, list[st
     readers: dict[str, Callable[[Xml.Element, Path, bool], Tree]] = {"robot": _urdf, "mujoco": _mjcf}
     if root.tag not in readers:
         raise ImportedError(f"{path}: found <{root.tag}>, allowed is <robot> (URDF) or <mujoco> (MJCF)")
-    try:
+    with mistakes_in(f"{path}"):
         tree = readers[root.tag](root, path, fixed)
-    except ImportedError:
-        raise
-    except ValueError as error:
-        raise ImportedError(f"{path}: {error}") from None
     if not tree.bodies:
         raise ImportedError(f"{path}: no body in it has a mass")
     for name, part in tree.bodies.items():

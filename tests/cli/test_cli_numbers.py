@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 from mdstopo.case.reader import read_case
 from mdstopo.cli.check import _say_frequencies
 from mdstopo.cli.check_numbers import depths, frequencies, material, totals
-from mdstopo.cli.gradient import _look_into_differences
-from mdstopo.cli.gradient_numbers import Reach, changes_peak, chosen_members, differences, disagreement, reach_of
+from mdstopo.cli.gradient import _note_other_peaks
+from mdstopo.cli.gradient_numbers import (
+    DifferenceSteps,
+    changes_peak,
+    chosen_members,
+    difference_steps,
+    differences,
+    disagreement,
+)
 from mdstopo.cli.output import Output
 from mdstopo.evaluation import Peak
 from mdstopo.status import Status
@@ -173,20 +180,20 @@ def peak(value, *gradient):
 
 
 def test_a_step_of_differences_that_makes_another_peak_decisive_is_known():
-    reach = Reach(np.array([1]), np.array([1e-3]), np.array([True]))
+    steps = DifferenceSteps(np.array([1]), np.array([1e-3]), np.array([True]))
     first = peak(2.0, 3.0, -1.0)
-    assert changes_peak([first, peak(2.0 - 1e-4, 3.0, -2.0)], reach)
-    assert not changes_peak([first, peak(2.0 - 2e-3, 3.0, -2.0)], reach)
-    assert not changes_peak([first, peak(2.0 - 1e-4, 30.0, -1.0)], reach)  # by a member that is not taken
-    assert not changes_peak([first], reach)
+    assert changes_peak([first, peak(2.0 - 1e-4, 3.0, -2.0)], steps)
+    assert not changes_peak([first, peak(2.0 - 2e-3, 3.0, -2.0)], steps)
+    assert not changes_peak([first, peak(2.0 - 1e-4, 30.0, -1.0)], steps)  # by a member that is not taken
+    assert not changes_peak([first], steps)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0], ids=["largest", "smallest"])
 def test_a_step_to_one_side_is_judged_by_its_side(sign):
-    reach = Reach(np.array([0]), np.array([1e-3]), np.array([False]))
+    steps = DifferenceSteps(np.array([0]), np.array([1e-3]), np.array([False]))
     first = peak(sign * 2.0, sign * 3.0)
-    assert not changes_peak([first, peak(sign * (2.0 - 1e-4), sign * -9.0)], reach)
-    assert changes_peak([first, peak(sign * (2.0 - 1e-4), sign * 9.0)], reach)
+    assert not changes_peak([first, peak(sign * (2.0 - 1e-4), sign * -9.0)], steps)
+    assert changes_peak([first, peak(sign * (2.0 - 1e-4), sign * 9.0)], steps)
 
 
 def test_gradient_tells_where_differences_are_no_derivative():
@@ -198,21 +205,21 @@ def test_gradient_tells_where_differences_are_no_derivative():
         asked.append(sensitivity)
         return SimpleNamespace(status=Status.OK, peaks=peaks)
 
-    reach = Reach(np.array([0]), np.array([1e-3]), np.array([True]))
+    steps = DifferenceSteps(np.array([0]), np.array([1e-3]), np.array([True]))
     for off, told in ((1e-3, True), (1e-9, False)):
         results = {m: {"differences": {"G": off, "H": off}, "message": ""} for m in ("adjoint", "direct")}
-        _look_into_differences(cast(Any, SimpleNamespace(evaluate=evaluate)), np.array([0.5]), reach, results)
+        _note_other_peaks(cast(Any, SimpleNamespace(evaluate=evaluate)), np.array([0.5]), steps, results)
         assert results["adjoint"]["message"].startswith("of G another peak") is told
         assert results["direct"]["message"] == ""
     assert asked == ["adjoint"]
 
 
-def test_where_differences_look():
+def test_the_steps_of_differences_are_those_of_the_design_and_the_bounds():
     text = CASE.replace(
         "objectives:", "design: {variables: {k: {group: m, parameter: stiffness, lower: 1, upper: 21}}}\nobjectives:"
     )
     case = read_case(text)
-    reach = reach_of(case, np.array([0.0, 5.0]), np.array([0]), np.array([0]))
-    assert reach.places.tolist() == [0, 1]
-    assert reach.both.tolist() == [False, True]
-    assert reach.steps == pytest.approx([2e-3, 2e-3 * 20.0])
+    steps = difference_steps(case, np.array([0.0, 5.0]), np.array([0]), np.array([0]))
+    assert steps.places.tolist() == [0, 1]
+    assert steps.both.tolist() == [False, True]
+    assert steps.longest == pytest.approx([2e-3, 2e-3 * 20.0])

@@ -33,6 +33,17 @@ def slopes(case, alpha, direction, h):
     return total
 
 
+def check_exact_methods(case, alpha, h=1e-3):
+    """Adjoint and direct gradients of a design agree, and are the slopes along one random direction."""
+    found = mdstopo.evaluate(case, alpha)
+    direct = mdstopo.evaluate(case, alpha, method="direct")
+    direction = np.random.default_rng(2).normal(size=case.n_design) * alpha
+    differences = slopes(case, alpha, direction, h)
+    for name, gradient in found.gradients.items():
+        assert abs(differences[name] - gradient @ direction) < 1e-8 * np.abs(gradient * direction).max(), name
+        assert np.abs(direct.gradients[name] - gradient).max() < 1e-9 * np.abs(gradient).max(), name
+
+
 def check_adjoint(case, h, bound):
     """The adjoint gradients of a design are the slopes along two random directions, to a share of the largest part."""
     alpha = design_of(case)

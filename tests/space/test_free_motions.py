@@ -10,7 +10,7 @@ import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
-from tests.general.support import slopes
+from tests.general.support import check_exact_methods
 
 #: a crate that stands askew on four feet, with a lamp that springs hold above it
 CRATE = """
@@ -55,13 +55,7 @@ def test_a_load_settles_with_its_heading_and_gradients_know_where() -> None:
     assert abs(twist(lamp)) > 1e-3  # which turns with the crate alone
     weighed = q[:2] * 100 + q[7:9] * 5  # no force along the floor
     assert np.abs(weighed - 100 * np.array([0.1, 0.05]) - 5 * np.array([0.3, 0.05])).max() < 1e-9
-    found = mdstopo.evaluate(case, alpha)
-    direct = mdstopo.evaluate(case, alpha, method="direct")
-    direction = np.random.default_rng(2).normal(size=case.n_design) * alpha
-    differences = slopes(case, alpha, direction, 1e-3)
-    for name, gradient in found.gradients.items():
-        assert abs(differences[name] - gradient @ direction) < 1e-8 * np.abs(gradient * direction).max(), name
-        assert np.abs(direct.gradients[name] - gradient).max() < 1e-9 * np.abs(gradient).max(), name
+    check_exact_methods(case, alpha)
 
 
 def test_a_load_on_a_rail_has_no_free_turn() -> None:

@@ -9,7 +9,7 @@ import yaml
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
-from tests.general.support import slopes
+from tests.general.support import check_exact_methods
 
 from .newton_euler import Scene, states
 from .test_bushings import pulls
@@ -53,13 +53,7 @@ def test_a_scene_that_has_settled_stays_where_it_is_and_gradients_know_where() -
     assert np.abs(motion.q - motion.q[0]).max() < 1e-9
     assert 1e-3 < 2.0 * np.arccos(motion.q[0, 3]) < 1.0  # of the engine, since home
     assert np.abs(turned - 1.0).max() < 1e-12
-    found = mdstopo.evaluate(case, alpha)
-    direct = mdstopo.evaluate(case, alpha, method="direct")
-    direction = np.random.default_rng(2).normal(size=case.n_design) * alpha
-    differences = slopes(case, alpha, direction, 1e-3)
-    for name, gradient in found.gradients.items():
-        assert abs(differences[name] - gradient @ direction) < 1e-8 * np.abs(gradient * direction).max(), name
-        assert np.abs(direct.gradients[name] - gradient).max() < 1e-9 * np.abs(gradient).max(), name
+    check_exact_methods(case, alpha)
 
 
 def test_forces_and_couples_of_another_program_balance_where_a_body_has_settled() -> None:

@@ -48,7 +48,7 @@ def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: flo
     """
     bodies, names = driver.scene.kinematics, driver.scene.bodies
     scene = _AtRest(driver, alpha, size)
-    q, back, most = q0, np.zeros(len(scene.force)), np.inf
+    q, back, limit = q0, np.zeros(len(scene.force)), np.inf
     for _ in range(RETURNS):
         q, found = _equilibrium(scene, q, q0, size)
         change = bodies.difference(q, q0)
@@ -59,12 +59,12 @@ def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: flo
             return f"body {names[free]} is free to turn, so that its equilibrium is not determined"
         back = free.back()
         far = scene.extent(back)
-        # what would be pushed away again stays: at the edge of where a slack strap leaves it free
-        if far <= KEPT * size or far > most:
+        # what has been pushed away again stays: at the edge of where a slack strap leaves it free
+        if far <= KEPT * size or far > limit:
             return _settled(driver, q, change, free.kept(scene.inverse()))
-        some = min(far, FAR * size)
-        q = bodies.retract(q, some / far * back)
-        most = far - 0.5 * some
+        step = min(far, FAR * size)
+        q = bodies.retract(q, step / far * back)
+        limit = far - 0.5 * step
     body = names[_farthest(driver, back, scene.arms)]
     return f"body {body} is free to move, and finds no static equilibrium with its stated place or heading"
 

@@ -6,7 +6,7 @@ import pytest
 from mdstopo import optimize
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
-from mdstopo.design_problem import bound_of
+from mdstopo.design_problem import lower_bound_of
 
 #: an arm that springs without free length balance exactly, where their moments add up to its weight's
 ARM = """
@@ -58,4 +58,4 @@ def test_a_balanced_arm_has_converged(response: str, reduction: str) -> None:
     ],
 )
 def test_which_objectives_cannot_be_below_zero(response: str, reduction: str, is_so: bool) -> None:
-    assert bound_of(arm(response, reduction).objectives[0]) == (0.0 if is_so else -np.inf)
+    assert lower_bound_of(arm(response, reduction).objectives[0]) == (0.0 if is_so else -np.inf)
