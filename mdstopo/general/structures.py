@@ -21,7 +21,12 @@ def __getattr__(name: str) -> type:
         )
         from mdstopo.general.model import general_model, priced_candidates  # noqa: F401
         from mdstopo.general.peaks import dense_output  # noqa: F401
-        from mdstopo.general.pricing import priced_tile, sorted_members  # noqa: F401
+        from mdstopo.general.pricing import (  # noqa: F401
+            priced_tile,
+            sorted_members,
+            switching_prices,
+            switching_together,
+        )
         from mdstopo.general.steps import step_history, step_trial  # noqa: F401
 
         numba()

@@ -355,7 +355,7 @@ def _begin(tile, s, first, few):
     """
     model, candidates, k = tile.model, tile.candidates, tile.k
     modes, sets, fresh = tile.lists.modes, tile.lists.sets, tile.lists.fresh
-    works, node = tile.sorting.works, tile.following[0]
+    works, node = tile.sorting.works, tile.following.node
     code = candidates.run[k, CODE]
     o = candidates.step[s, FIRST_NODE]
     for at in range(first, first + few.size[PART_COLUMNS], SHORT):
@@ -754,7 +754,7 @@ def _sum_stages(tile, s, mode, low, high, count, few):
                 store(now[ELONGATION], i, load(now[ELONGATION], i) - less)
             add_polynomial(
                 code, candidates.law[k], model.curves, candidates.when[o], candidates.level[o], candidates.energy[o],
-                now, members, mode, following[0], following[1], few.sums[n],
+                now, members, mode, following.node, following.power, few.sums[n],
             )  # fmt: skip
     worst = 0.0
     for n in range(count):

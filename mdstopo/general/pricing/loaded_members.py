@@ -114,7 +114,7 @@ def add_states(model, candidates, k, first, behind, members, mode, kept, works, 
                 works[ELONGATION, m] -= kept[0]
         if quick:
             add_polynomial(
-                code, p, model.curves, t, value, weight, works, members, mode, following[0], following[1], values
+                code, p, model.curves, t, value, weight, works, members, mode, following.node, following.power, values
             )  # fmt: skip
         else:
             add_in_mode(code, p, model.curves, t, value, weight, free, works, mode, values[:members])

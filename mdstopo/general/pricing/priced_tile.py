@@ -53,8 +53,8 @@ class PricedTile:
 
     model: with room for ROOM members, which are overwritten. candidates, k: a `PricedCandidates`, and the number of the
     run. grids, i, j, error: as of `tile_interpolation.take_prices`. height, width: rows and columns of the tile.
-    lists: its `StepLists`. scratch, following, switching: of `tile_interpolation.make_scratch`, `make_following` and
-    `make_switching`. spans: its `Spans`. sorting: a `Sorting`. price (PLACES,): of the members, added to.
+    lists: its `StepLists`. scratch: of `tile_interpolation.make_scratch`. spans: its `Spans`. following: a `Following`.
+    sorting: a `Sorting`. switching: a `Switching`. price (PLACES,): of the members, added to.
     """
 
     def __init__(self, *_parts: Any) -> None: ...

@@ -37,6 +37,7 @@ from mdstopo.sensitivity.tile_interpolation import (
     PRICED,
     SHORT,
     begin_part,
+    found_prices,
     next_candidates,
     place_candidates,
     take_prices,
@@ -212,7 +213,7 @@ def price_each(tile, s, first, size, c, to):
     modes, sets, found, fresh = lists.modes, lists.sets, lists.found, lists.fresh
     kind, classes, places = tile.sorting.kind, tile.sorting.classes, tile.sorting.places
     switching = tile.switching
-    values = tile.scratch[5]
+    values = found_prices(tile.scratch)
     step = candidates.step[s]
     old = classes[c, FROM]
     new = classes[c, TO]
@@ -223,14 +224,14 @@ def price_each(tile, s, first, size, c, to):
         for at in range(0, count, TOGETHER):
             wide = min(TOGETHER, count - at)
             for m in range(wide):
-                switching[5][0, m] = sets[0, places[at + m]]
+                switching.sets[0, m] = sets[0, places[at + m]]
             take_members(model, places[at : at + wide], wide, np.int64(TOGETHER))
             price_switched(model, candidates, k, wide, s, old, new, switching)
             for m in range(wide):
                 b = places[at + m]
-                fresh[b] = switching[5][1, m]
-                if switching[4][SUM, m] == switching[4][SUM, m]:
-                    price[b] += switching[4][SUM, m]
+                fresh[b] = switching.sets[1, m]
+                if switching.found[SUM, m] == switching.found[SUM, m]:
+                    price[b] += switching.found[SUM, m]
                     modes[to, b] = new
                 else:
                     kind[b] = UNSORTED
@@ -271,16 +272,17 @@ def follow_others(tile, s, first, size, begun, to):
         wide = min(ROW, count - at)
         take_members(model, places[at : at + wide], wide, np.int64(ROW))
         for m in range(wide):
-            following[4][0, m] = modes[0, places[at + m]]
-            following[5][0, m] = sets[0, places[at + m]]
+            following.modes[0, m] = modes[0, places[at + m]]
+            following.sets[0, m] = sets[0, places[at + m]]
         values[:] = 0.0
         price_step(
-            model, candidates, k, np.int64(0), wide, s, following[4][0], following[5][0], begun, yes, following, values
+            model, candidates, k, np.int64(0), wide, s, following.modes[0], following.sets[0], begun, yes, following,
+            values,
         )  # fmt: skip
         for m in range(wide):
             b = places[at + m]
             price[b] += values[m]
             if law_remembers(candidates.run[k, CODE]):
-                modes[to, b] = following[4][1, m]
-                fresh[b] = following[5][1, m]
+                modes[to, b] = following.modes[1, m]
+                fresh[b] = following.sets[1, m]
     return 1.0 * count

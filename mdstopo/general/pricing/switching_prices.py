@@ -6,6 +6,8 @@ over the pieces: there the virtual change, and the weight of the energy, are the
 stages give.
 """
 
+from typing import Any
+
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
@@ -20,6 +22,7 @@ from mdstopo.general.design.followed_member import (
     follow,
     over_pieces,
 )
+from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import (
     CODE,
@@ -68,12 +71,24 @@ NOWHERE = -1
 NO_REST = 1.0
 
 
+class Following:
+    """Members that are followed through a step, ROW at most, inside kernels.
+
+    node, power (NODE_ROWS, NODES): values of a member at nodes, and coefficients of the polynomials through them.
+    pieces (CHANGES + 1, PIECE): between its switches. works (NODES + 2, WORKS, ROW): what members do at nodes and at a
+    stage, and prices. modes, sets (3, ROW): modes and permanent sets (m) with which members begin a step, end it, stay.
+    """
+
+    def __init__(self, *_arrays: Any) -> None: ...
+
+
+bundle(Following, ("node", "power", "pieces", "works", "modes", "sets"))
+
+
 @kernel
 def make_following():
-    """What following members needs: values at nodes, coefficients of the polynomials through them, pieces; what members
-    do at nodes and at a stage, and prices; modes and permanent sets with which members begin a step, end it, stay.
-    """
-    return (
+    """A `Following`, with no member in a mode."""
+    return Following(
         np.empty((NODE_ROWS, NODES)),
         np.empty((NODE_ROWS, NODES)),
         np.zeros((CHANGES + 1, PIECE)),
@@ -90,12 +105,11 @@ def price_followed(model, candidates, k, at, count, following, price):
     model: with the members.
     candidates, k: a `PricedCandidates`, and the number of the run.
     at, count: the first member, and how many there are, ROW at most.
-    following: of `make_following`, overwritten.
+    following: a `Following`, overwritten.
     price (count,): added to.
     """
     run = candidates.run[k]
-    modes = following[4]
-    sets = following[5]
+    modes, sets = following.modes, following.sets
     modes[:] = 0
     sets[:] = 0.0
     begun = np.bool_(False)
@@ -168,10 +182,11 @@ def price_step(model, candidates, k, at, count, s, begin, begin_set, begun, quic
       begun: whether they are in modes.
       quick: whether last digits may depend on which members are followed together.
     Out:
-      following: of `make_following`: its modes and sets in row 1 are those with which the members end.
+      following: a `Following`: its modes and sets in row 1 are those with which the members end.
       price (count,): added to.
     """
-    node, power, pieces, works, modes, sets = following
+    node, power, pieces = following.node, following.power, following.pieces
+    works, modes, sets = following.works, following.modes, following.sets
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     curves = model.curves
@@ -215,9 +230,10 @@ def _add_stages(model, candidates, k, at, count, s, quick, following, price):
     """Add what the members that stay in their modes do in a step: the second part of `price_step`.
 
     model, candidates, k, at, count, s, quick, price: as there.
-    following: of `make_following`, of which row 2 of the modes and sets counts, NOWHERE where a member does not stay.
+    following: a `Following`, of which row 2 of the modes and sets counts, NOWHERE where a member does not stay.
     """
-    node, power, _, works, modes, sets = following
+    node, power = following.node, following.power
+    works, modes, sets = following.works, following.modes, following.sets
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     curves = model.curves

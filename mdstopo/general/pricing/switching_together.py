@@ -8,11 +8,14 @@ A margin may be the lesser of two linear functions. The one by which the first m
 that leave by the other one fail the check of their switch, and have to be followed one by one.
 """
 
+from typing import Any
+
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import inverse_root, lanes, load, store, zero
 from mdstopo.general.design.followed_member import GAUSS, LOCATED, NODE_ROWS
+from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, MOVES, NODE, NODES, POWERS
 from mdstopo.general.pricing.switching_prices import at_places, fill_law
@@ -41,11 +44,24 @@ TIMES = 4
 GONE = 1e-10
 
 
+class Switching:
+    """Members that switch in the same step, TOGETHER at most, inside kernels.
+
+    works (NODES, WORKS, TOGETHER): what they do at nodes. power (NODE_ROWS, NODES, TOGETHER), margin (NODES, TOGETHER):
+    polynomials through these, and of the margin. law_power (4, 5): scratch of `fill_law`. found (5, TOGETHER): what is
+    found of each. sets (2, TOGETHER): permanent sets (m) with which they begin the step, and end it.
+    """
+
+    def __init__(self, *_arrays: Any) -> None: ...
+
+
+bundle(Switching, ("works", "power", "margin", "law_power", "found", "sets"))
+
+
 @kernel
 def make_switching():
-    """What following many members needs: what they do at nodes; polynomials through these, of the margin, and of a law;
-    what is found of each member; permanent sets, and those that are made."""
-    return (
+    """A `Switching`."""
+    return Switching(
         np.zeros((NODES, WORKS, TOGETHER)),
         np.zeros((NODE_ROWS, NODES, TOGETHER)),
         np.zeros((NODES, TOGETHER)),
@@ -72,10 +88,11 @@ def price_switched(model, candidates, k, count, s, old, new, switching):
       s: the number of the step.
       old, new: the modes.
     In place:
-      switching: of `make_switching`: sets in row 0 are those with which members begin; of what is found SUM counts, NaN
+      switching: a `Switching`: sets in row 0 are those with which members begin; of what is found SUM counts, NaN
         where a member has to be followed by itself; sets in row 1 are those with which they end.
     """
-    works, power, margin, _, found, sets = switching
+    works, power, margin = switching.works, switching.power, switching.margin
+    found, sets = switching.found, switching.sets
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     time = candidates.step_time[s]
@@ -114,7 +131,7 @@ def _check(code, p, curves, rest, time, old, new, i, switching):
     old, new, switching: as of `price_switched`.
     i: the member.
     """
-    works, power, _, _, found, sets = switching
+    works, power, found, sets = switching.works, switching.power, switching.found, switching.sets
     c = found[AT, i]
     x = _of_member(power[ELONGATION], c, i)
     rate = _of_member(power[RATE], c, i)
@@ -213,7 +230,8 @@ def _add_pieces(model, candidates, k, s, count, old, new, switching):
 
     model, candidates, k, s, count, old, new, switching: as of `price_switched`.
     """
-    works, power, _, law_power, found, sets = switching
+    works, power, law_power = switching.works, switching.power, switching.law_power
+    found, sets = switching.found, switching.sets
     p = candidates.law[k]
     code = candidates.run[k, CODE]
     first = candidates.step[s, FIRST_NODE]

@@ -52,6 +52,7 @@ from mdstopo.sensitivity.tile_interpolation import (
     SHORT,
     TALL,
     begin_part,
+    found_prices,
     next_candidates,
     number_candidates,
     take_prices,
@@ -372,23 +373,25 @@ def _add_listed(tile, part, kept, members):
     members: how many there are.
     """
     model, candidates, k, lists, following = tile.model, tile.candidates, tile.k, tile.lists, tile.following
-    values = tile.scratch[5]
+    values = found_prices(tile.scratch)
     run = candidates.run[k]
     yes = np.bool_(True)
     for n in range(lists.count[part]):
         known = lists.told[part, n]
         s = run[FIRST_STEP] + lists.step[part, n]
         if known <= LEAVES:
-            following[4][0] = LEAVES - known
-            following[5][0] = kept
+            following.modes[0] = LEAVES - known
+            following.sets[0] = kept
             for at in range(0, members, ROW):
                 wide = min(ROW, members - at)
                 price_step(
-                    model, candidates, k, at, wide, s, following[4][0], following[5][0], yes, yes, following,
+                    model, candidates, k, at, wide, s, following.modes[0], following.sets[0], yes, yes, following,
                     values[at : at + wide],
                 )  # fmt: skip
             continue
         o = candidates.step[s, FIRST_STAGE]
         behind = candidates.step[s, LAST_STAGE]
-        following[5][0, 0] = kept
-        add_states(model, candidates, k, o, behind, members, known, following[5][0, :1], lists.works, following, values)
+        following.sets[0, 0] = kept
+        add_states(
+            model, candidates, k, o, behind, members, known, following.sets[0, :1], lists.works, following, values
+        )
