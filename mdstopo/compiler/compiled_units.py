@@ -22,7 +22,10 @@ SPLIT = "mdstopo.general."
 #: can be done away with is gone; so what is called by its symbol instead loses nothing
 LONG = 160
 #: modules of deep calls, whose long functions would else be optimised once more with everyone that calls them
-STAYING = ("mdstopo.optimizer.conic_kernels", "mdstopo.optimizer.reduced", "mdstopo.optimizer.cones")
+STAYING = (
+    "mdstopo.optimizer.conic_kernels", "mdstopo.optimizer.reduced", "mdstopo.optimizer.cones",
+    "mdstopo.optimizer.wide_slots", "mdstopo.optimizer.wide_sorting", "mdstopo.optimizer.wide_kernels",
+)  # fmt: skip
 #: what a symbol of our own kernels begins with; symbols of functions that Numba makes differ between processes
 _OURS = "_ZN7mdstopo"
 
