@@ -404,6 +404,26 @@ def _tell(infer: Any, loc: Any, told: list[Any]) -> None:
             warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
 
 
+def _spare_literals() -> None:
+    """Whether a value has a type of its own is looked up. Numba asks it of both sides of every operator, twice, though
+    most have no value yet, and each time makes an error to find that out."""
+    constants: Any = types
+    lowered: Any = lowering
+    makers, literal, unknown = constants.Literal.ctor_map, constants.literal, types.Omitted(ir.UNDEFINED)
+
+    def literal_or_omitted(value: Any) -> Any:
+        if value is ir.UNDEFINED:
+            return unknown
+        return literal(value) if type(value) in makers else types.Omitted(value)
+
+    def maybe_literal(value: Any) -> Any:
+        known = type(value) in makers or isinstance(value, types.Literal)  # of the latter it says what is wrong
+        return literal(value) if known else None
+
+    lowered._lit_or_omitted = literal_or_omitted
+    constants.maybe_literal = maybe_literal
+
+
 def _is_operator(function: Any) -> bool:
     return getattr(function, "__module__", None) == "_operator"
 
@@ -430,5 +450,6 @@ def spare_numba() -> None:
     _spare_ranges()
     _spare_rounds()
     _spare_warnings()
+    _spare_literals()
     names: Any = itanium_mangler
     names._escape_string = functools.lru_cache(1 << 16)(names._escape_string)
