@@ -226,6 +226,9 @@ class _Urdf:
             self.tree.add(body, part)
         elif body != "ground":
             self.tree.bodies[body] = self.tree.bodies[body] + part
+        elif part.mass > 0.0:
+            where = "it is fixed to a first link without mass, taken for ground"
+            self.tree.tell(f"the mass of {name!r} is left out: {where}")
         for joint in self.joints.get(name, ()):
             self.joint(joint, at @ _origin(joint.find("origin")), body)
 

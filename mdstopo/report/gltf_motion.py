@@ -26,8 +26,9 @@ from mdstopo.scene.quaternions import product, quaternions_of
 MOST = 1000
 #: between two frames no body turns by more (rad); frames of an animation, at least and at most
 TURN, FEWEST, LONGEST = 0.2, 121, 4001
-#: up to how much turn within a step of the integrator (rad) its ends are enough to know what is between them
-SMOOTH = 0.8
+#: up to how much turn within a step of the integrator (rad) its ends are enough to know what is between them; and by
+#: how much of the scene's size, or of a radian, their accelerations may bend that
+SMOOTH, BENT = 0.8, 2e-4
 #: shares of the scene's size: radius of the thickest member, of the thinnest, and of joints
 THICK, THIN, JOINT = 0.006, 0.001, 0.012
 #: share of the scene's size between the axes of members of the same two points: the thickest do not touch
@@ -65,11 +66,11 @@ class _Scene:
         self.names = [*(body.name for body in self.case.bodies), GROUND]
         start = start_state(self.case)
         self.first = _poses(self.case, np.zeros(1), start[None])
-        self.motions = {name: _motion(source, name) for name in source.load_cases}
         shapes = {name: _shape(self.case, name) for name in self.names}
         cloud = [_lifted(self.case, ends_at(self.case, group, start)).reshape(-1, 3) for group in self.case.members]
         cloud += [self.first.place[0], *(shape.corners for shape in shapes.values())]
         self.size = max(float(np.linalg.norm(np.ptp(np.concatenate(cloud), axis=0))), 1e-9)
+        self.motions = {name: _motion(source, name, BENT * self.size) for name in source.load_cases}
         self.shapes = shapes
         self.touched = surfaces_of(self.case) if self.case.dimension > 2 else []
         #: by node: where it is in every load case, to be animated
@@ -224,18 +225,20 @@ class _Scene:
             self.out.add("animations", name=name, samplers=samplers, channels=channels, extras=extras)
 
 
-def _motion(source: Source, load_case: str) -> Poses:
+def _motion(source: Source, load_case: str, bent: float) -> Poses:
     """The motion at even times, close enough for the turns of bodies.
 
     Between the steps that the file has, cubic polynomials with their rates; where bodies turn too far within a step,
-    and where the file has no motion of the design, it is simulated again.
+    where these polynomials may be off by more than `bent` (m, or BENT of a radian), and where the file has no motion of
+    the design, it is simulated again.
     """
     case = source.case
     stored = source.view.under(f"trajectories/{load_case}")
     found = None
-    if stored and "v" in stored and len(stored["t"]) > 1:
-        t, q, v = (np.asarray(stored[name], dtype=np.float64) for name in ("t", "q", "v"))
-        if float((_spins(case, v)[:-1] * np.diff(t)[:, None]).max(initial=0.0)) <= SMOOTH:
+    if stored and "v" in stored and "a" in stored and len(stored["t"]) > 1:
+        t, q, v, a = (np.asarray(stored[name], dtype=np.float64) for name in ("t", "q", "v", "a"))
+        turned = float((_spins(case, v)[:-1] * np.diff(t)[:, None]).max(initial=0.0))
+        if turned <= SMOOTH and _is_straight(case, (t, q, v, a), bent):
             found = CubicHermiteSpline(t, q, _slopes(case, q, v))
     if found is None:
         motion = source.engine.trajectory(source.design, load_case)
@@ -246,6 +249,25 @@ def _motion(source: Source, load_case: str) -> Poses:
         return _poses(case, times, motion.at(times).q)
     times = _even(case, t, v)
     return _poses(case, times, found(times))
+
+
+def _is_straight(case: Case, states: tuple[Floats, Floats, Floats, Floats], bent: float) -> bool:
+    """Whether the quintics that have also the accelerations at the ends of steps are near the cubics that have not.
+
+    states: times (T,), coordinates, velocities, accelerations. bent: how far apart they may be in places (m); in a
+    plane in angles BENT (rad).
+    """
+    t, *states_at = states
+    count = len(case.bodies)
+    # coordinates of bodies that are numbers: all in a plane, in space places alone
+    q, v, a = (each.reshape(len(t), count, -1)[..., :3] for each in states_at)
+    h = np.diff(t)[:, None, None]
+    mean = np.diff(q, axis=0) / h
+    first = (6.0 * mean - 4.0 * v[:-1] - 2.0 * v[1:]) / h  # the cubics' second derivatives at both ends
+    last = (-6.0 * mean + 2.0 * v[:-1] + 4.0 * v[1:]) / h
+    apart = h**2 / 64.0 * (np.abs(a[:-1] - first) + np.abs(a[1:] - last))
+    allowed = np.array([bent, bent, BENT if case.dimension == 2 else bent])
+    return bool(np.all(apart <= allowed))
 
 
 def _even(case: Case, t: Floats, v: Floats) -> Floats:

@@ -174,7 +174,8 @@ class SizeSearch:
         self._start = x
         #: choices that were evaluated -> their objective, infinite where they keep no constraint
         self._known: dict[tuple[int, ...], float] = {}
-        #: whether the neighbours of the best choices have been tried
+        #: the choices with whose neighbours the search ends, None before it has come to that; whether all were tried
+        self._beginnings: list[tuple[int, ...]] | None = None
         self._refined = False
 
     # -- the search
@@ -388,9 +389,11 @@ class SizeSearch:
 
     def _refine(self, stop: Callable[[], bool]) -> bool:
         """Go downhill from the best choices that were met, to better neighbours; whether it came to its end."""
-        usable = [(value, key) for key, value in self._known.items() if np.isfinite(value)]
-        for value, key in sorted(usable)[: 1 if len(self._others) else BEGINNINGS]:
-            at, least = np.array(key, dtype=np.int64), value
+        if self._beginnings is None:
+            usable = [(value, key) for key, value in self._known.items() if np.isfinite(value)]
+            self._beginnings = [key for _, key in sorted(usable)[: 1 if len(self._others) else BEGINNINGS]]
+        for key in self._beginnings:
+            at, least = np.array(key, dtype=np.int64), self._known[key]
             improved = True
             while improved and self._counts[0] < MOST_EVALUATIONS:
                 improved = False
@@ -422,7 +425,7 @@ class SizeSearch:
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Everything that a later process needs to go on, by name."""
         progress, k, n = self.progress, len(self._catalogued.place), len(self._start)
-        nodes = sorted(self._open)
+        nodes, begun = sorted(self._open), self._beginnings or []
         numbers = (
             progress.objective, progress.nodes, self._counts[0], self._made, self._refined, progress.exchanged,
             progress.exhaustive,
@@ -437,6 +440,7 @@ class SizeSearch:
             "x": np.full(n, np.nan) if progress.x is None else progress.x,
             "tried": np.array(list(self._known), dtype=np.int64).reshape(len(self._known), k),
             "values": np.array(list(self._known.values()), dtype=np.float64),
+            "beginnings": np.array(begun, dtype=np.int64).reshape(len(begun), k),
             "numbers": np.array(numbers, dtype=np.float64),
             "place": self._catalogued.place,
         }
@@ -453,6 +457,7 @@ class SizeSearch:
         self._made, self._refined = int(made), bool(refined)
         tried = map(tuple, np.asarray(arrays["tried"]).tolist())
         self._known = dict(zip(tried, np.asarray(arrays["values"]).tolist(), strict=True))
+        self._beginnings = list(map(tuple, np.asarray(arrays["beginnings"]).tolist())) or None
         self.progress = progress_in(arrays)
         self._counts[0] = self.progress.evaluations
 

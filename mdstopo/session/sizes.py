@@ -174,16 +174,20 @@ class Sizes:
         return -1.0 if self.case.objectives[0].sense == "maximize" else 1.0
 
     def _held(self, problem: Problem, x: Floats) -> tuple[Within, Catalogued]:
-        """The problem with members that are not kept at their least size, and the variables of the others."""
+        """The problem with members that are not kept at their least size and its price, and the variables of the
+        others."""
         lower, upper, begin = problem.lower.copy(), problem.upper.copy(), x.copy()
+        # rows have the sizes of members that are held: what their prices are above these is spent before
+        rows, dearer = problem.linear, np.zeros(len(x))
         kept = []
         for place, group in self._groups_at().items():
             positive = [size for size in group.sizes if size > 0.0]
             if positive and x[place] < KEPT * positive[0]:
                 lower[place] = upper[place] = begin[place] = group.sizes[0]
+                dearer[place] = group.prices[0] - group.sizes[0]
             elif positive:
                 kept.append(place)
-        held = Within(problem, [0], lower, upper, problem.linear)
+        held = Within(problem, [0], lower, upper, replace(rows, b=rows.b - rows.A @ dearer))
         held.initial = begin
         return held, self._catalogued(sorted(kept))
 

@@ -158,6 +158,18 @@ def test_a_robot_of_links_becomes_bodies_where_they_stand_with_parts_glued_toget
     assert told == ["<limit> of joints is left out"]
 
 
+def test_a_mass_that_is_fixed_to_a_first_link_without_one_is_told_to_be_left_out() -> None:
+    massless = '<link name="footprint"/><link name="base"><inertial><mass value="5"/></inertial></link>'
+    joints = (
+        '<joint name="a" type="fixed"><parent link="footprint"/><child link="base"/></joint>'
+        '<joint name="b" type="revolute"><parent link="base"/><child link="arm"/></joint>'
+    )
+    arm = '<link name="arm"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
+    case, told = case_of(f"<robot>{massless}{arm}{joints}</robot>", "cart.urdf")
+    assert [body.name for body in case.bodies] == ["arm"]
+    assert told == ["the mass of 'base' is left out: it is fixed to a first link without mass, taken for ground"]
+
+
 def test_a_robot_of_nested_bodies_has_the_masses_of_its_shapes() -> None:
     case, told = case_of(MJCF, "toy.xml")
     cart, pole, ball = case.bodies

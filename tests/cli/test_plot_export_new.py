@@ -239,6 +239,27 @@ def test_the_motion_of_a_plane_is_exported_as_gltf(results, kind, words, tmp_pat
     assert run_group(["export", str(results[kind]), "--csv", "--point", "0"]) == 2
 
 
+#: a weight that swings on a spring by x = 1 + 0.2 cos 20 t
+SWING = """
+format: 1
+time: {end: 2}
+bodies: {a: {mass: 2, inertia: 1, position: [1.2, 0]}}
+members: {s: {from: {body: ground, at: [0, 0]}, to: {body: a, at: [1.2, 0]}, law: LAW}}
+"""
+
+
+def test_exported_places_are_those_of_the_motion_however_long_its_steps_are(tmp_path):
+    case, result, out = tmp_path / "swing.yaml", tmp_path / "swing.h5", tmp_path / "swing.glb"
+    case.write_text(SWING.replace("LAW", "{type: spring, stiffness: 800, free_length: 1}"))
+    assert run_group(["simulate", str(case), "--out", str(result), "--quiet"]) == 0
+    with h5py.File(result) as file:
+        assert np.diff(file["trajectories/default/t"][()]).max() > 0.05
+    assert run_group(["export", str(result), "--gltf", "--out", str(out), "--quiet"]) == 0
+    found = Gltf(out.read_bytes())
+    t, places = found.track(0, found.node("a"), "translation")
+    assert places[:, 0] == pytest.approx(1.0 + 0.2 * np.cos(20.0 * t.astype(float)), abs=2e-4)
+
+
 def test_finished_files_name_their_axes_and_units(results):
     with h5py.File(results["run"]) as file:
         q = file["trajectories/rotation/q"]

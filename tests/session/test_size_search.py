@@ -124,6 +124,42 @@ def test_a_search_that_is_stopped_goes_on_to_the_same_choice():
     assert (resumed.nodes, resumed.evaluations) == (whole.nodes, whole.evaluations)
 
 
+def test_a_search_that_is_stopped_among_the_last_neighbours_goes_on_to_the_same_choice():
+    class Waves(Springs):
+        """With many local optima."""
+
+        def evaluate(self, x, gradient=True):
+            sample = super().evaluate(x, gradient)
+            w = np.array([3.0, -4.0, 5.0, -6.0])
+            value, slope = sample.objective + 1.5 * np.sin(w @ x), sample.gradients + 1.5 * np.cos(w @ x) * w
+            return Sample(value, np.array([value]), slope, np.zeros(0), np.zeros((0, 4)), status=Status.OK)
+
+    problem, sizes, asked, seen = Waves(3, 4, 0.45), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], [], []
+    assert len(sizes) ** 4 > FEW
+
+    def ask():
+        asked.append(0)
+        return False
+
+    whole = search_of(problem, sizes).run(ask, seen.append)
+    among_nodes = len(seen) - 1
+    assert len(asked) > among_nodes + 20
+    for share in (0.3, 0.9):
+        calls = itertools.count()
+        stopped = int(among_nodes + share * (len(asked) - among_nodes))
+        first = search_of(problem, sizes)
+        assert not first.run(lambda calls=calls, stopped=stopped: next(calls) >= stopped, nothing).finished
+        second = search_of(problem, sizes)
+        second.restore(first.to_arrays())
+        resumed = second.run(never, nothing)
+        assert np.array_equal(resumed.x, whole.x)
+        assert (resumed.nodes, resumed.evaluations, resumed.exchanged) == (
+            whole.nodes,
+            whole.evaluations,
+            whole.exchanged,
+        )
+
+
 def test_nothing_is_chosen_where_no_choice_keeps_the_rows():
     problem = Springs(4, 8, 0.1)
     found = search_of(problem, [0.5, 0.7, 1.0]).run(never, nothing)

@@ -119,6 +119,21 @@ def test_prices_count_beside_limits_on_responses(tmp_path):
     assert last.tolist() == pytest.approx(outcome.constraints.tolist(), abs=1e-12)
 
 
+@pytest.mark.parametrize("few", [1000, 10], ids=["all choices", "branch and bound"])
+def test_members_that_are_not_kept_pay_for_the_least_size(few, monkeypatch):
+    monkeypatch.setattr("mdstopo.session.size_search.FEW", few)
+    sizes, prices = [0.0, 0.4, 1.0], [0.2, 0.7, 1.2]
+    case = case_with("{sizes: [0, 0.4, 1], prices: [0.2, 0.7, 1.2]}")
+    outcome = run_session(case)
+    assert outcome.sizes.members < case.n_design
+    best, at = brute(case, outcome, sizes, prices)
+    assert outcome.objectives["G"] == pytest.approx(best, rel=1e-9)
+    assert outcome.alpha.tolist() == at
+    spent = sum(dict(zip(sizes, prices, strict=True))[size] for size in at)
+    assert outcome.constraints.tolist() == pytest.approx([spent - 3.5], abs=1e-12)
+    assert spent <= 3.5
+
+
 def test_a_run_with_sizes_that_is_opened_again_stays_as_it_is(tmp_path):
     place, case = tmp_path / "r.h5", case_with(PRICED)
     whole = run_session(case, path=place)

@@ -30,7 +30,7 @@ from mdstopo.general.model.general_model import (
 from mdstopo.general.over_time.competing_members import compete, members_peaks
 from mdstopo.general.over_time.minima import minima
 from mdstopo.general.over_time.pieces import Pieces
-from mdstopo.general.over_time.quadrature_breakpoints import ROUNDS, quadrature_breakpoints
+from mdstopo.general.over_time.quadrature_breakpoints import ROUNDS, followed_integrals, quadrature_breakpoints
 from mdstopo.general.over_time.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.responses.extremes import (
     COLUMNS,
@@ -280,8 +280,9 @@ class GeneralDriver:
         window = CLOSENESS if rows.window is None else rows.window
         across = self._across() if rows.cones and gradient and self._is_planar else None
         self.quadrature_breakpoints = []
-        for _ in range(ROUNDS if self._integrated else 0):
-            more = quadrature_breakpoints(self, self.count) if code == OK else []
+        followed = followed_integrals(self, self.count) if self._integrated and code == OK else []
+        for _ in range(ROUNDS):
+            more = quadrature_breakpoints(self, self.count, followed) if code == OK else []
             if not more:
                 break
             self.quadrature_breakpoints = self.quadrature_breakpoints + more

@@ -16,6 +16,7 @@ from mdstopo.general.over_time.minima import LOW
 from mdstopo.general.over_time.pieces import Pieces
 from mdstopo.general.responses.extremes import FRACTION, STEP, TIME, VALUE, EvaluateAt
 from mdstopo.general.responses.general_responses import has_kinks, has_norm, is_expression
+from mdstopo.general.steps.step_history import EVENTS
 from mdstopo.scene.springs_model import FloatArray
 
 #: a window, relative to the lowest minimum, within which every minimum is: the lowest may be next to zero
@@ -29,7 +30,22 @@ DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
 
 def kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
     """Times inside (t[0], t[-1]) at which steps have to end because response j has a kink there; t (m + 1,): the steps'
-    times."""
+    times. At an event steps end anyway."""
+    found = _kinks(driver, j, t)
+    return [time for time in found if not _is_at_event(driver, t, time)]
+
+
+def _is_at_event(driver: DriverWithRun, t: FloatArray, time: float) -> bool:
+    """Whether a time is that of an event, to rounding. An event's time varies with the design. A given time beside it,
+    at which a step ends, would take its place, and what is read there would seem not to move."""
+    happened = np.diff(driver.index_of_steps()[: len(t), EVENTS]) > 0
+    step = np.clip(np.searchsorted(t, time) - 1, 0, len(t) - 2)
+    apart = np.abs(t[1:][happened] - time)
+    return bool(np.any(apart <= DISTANCES[-1] * (t[step + 1] - t[step])))
+
+
+def _kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
+    """Times inside (t[0], t[-1]) at which response j has a kink, events among them; t (m + 1,): the steps' times."""
     pieces = Pieces(driver, j, t)
     values, rates = pieces.samples[:, :, 0], pieces.samples[:, :, 1]
     highest = float(np.abs(values).max())

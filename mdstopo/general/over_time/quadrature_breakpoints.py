@@ -9,7 +9,7 @@ computed once more with steps that end at these middles; since steps between the
 Steps of fixed length promise no accuracy, and stay as they are.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -47,17 +47,23 @@ MISSED, MOSTLY = 1e-3, 0.75
 Integrand = Callable[[FloatArray, IndexArray], FloatArray]
 
 
-def quadrature_breakpoints(driver: DriverWithRun, count: int) -> list[float]:
-    """Times at which steps are to end, beside `driver.quadrature_breakpoints`, from the `count` steps of its last
-    run."""
-    model, found = driver.scene.model, list[float]()
-    integrals = [
-        (j, kind.is_squared)
+def followed_integrals(driver: DriverWithRun, count: int) -> list[int]:
+    """The responses whose integrals steps have to follow: those that no joints hold at zero. To be asked of a first
+    run, of `count` steps: in steps that are shorter for the sake of others rounding hides it."""
+    return [
+        j
         for j, kind in enumerate(driver.scene.reductions)
         if kind.is_integral and not _is_held_at_zero(driver, j, count)
     ]
-    if not integrals:
+
+
+def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Sequence[int]) -> list[float]:
+    """Times at which steps are to end, beside `driver.quadrature_breakpoints`, from the `count` steps of its last
+    run. followed: of `followed_integrals`."""
+    model, found = driver.scene.model, list[float]()
+    if not followed:
         return found
+    integrals = [(j, driver.scene.reductions[j].is_squared) for j in followed]
     t = driver.states()[0][: count + 1].copy()
     if not driver.quadrature_breakpoints:
         for j, _ in integrals:
