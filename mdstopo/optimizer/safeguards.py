@@ -61,7 +61,7 @@ def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
         if known and len(sample.rows) and finite(steepest(sample.gradients)):
             return ""
         return Status.NON_FINITE.value
-    return f"{sample.status.value} ({sample.message})" if sample.message else sample.status.value
+    return sample.failure
 
 
 def cuts_of(state: GsaoState, sample: Sample) -> tuple[Floats, Floats, bool]:
