@@ -544,7 +544,10 @@ class Evaluator:
             return Status.UNRESOLVED, driver.member(result.unresolved)
         status, steps = driver.simulate(design)
         if status.ok:  # the motion alone; it was to be computed again with steps that integrals over time need
-            return result.status, "with the steps that integrals over time need"
+            return result.status, (
+                "with the steps that integrals over time need, very many where one is next to zero: there add a small "
+                "amount to its response by an expression"
+            )
         return driver.explain(design, status, float(steps.t[-1]), steps.q[-1], steps.v[-1])
 
     def _evaluation(

@@ -126,7 +126,10 @@ def _head(case: "Case", count: int) -> str:
 
 def _say(output: Output, done: "Finalized", place: Path) -> None:
     outcome = done.outcome
-    output.say(f"{done.case.title or done.case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")
+    ended = f"{outcome.status.replace('_', ' ')} - {outcome.reason}"
+    # what was asked for is a case; how its sizes ended is told of one that is refused, but not first
+    head, sizes = (ended, "") if done.text else (f"not written - {_why(done)}", ended)
+    output.say(f"{done.case.title or done.case.name}: {head}")
     if done.columns:
         rows = [["", *(column.title for column in done.columns)]]
         found = [column.evaluation for column in done.columns]
@@ -138,7 +141,8 @@ def _say(output: Output, done: "Finalized", place: Path) -> None:
         rows.append(["members", *(str(column.members) for column in done.columns)])
         rows += _values(done)
         output.table(rows)
-    rows = [["iterations", f"{outcome.iterations}, {outcome.evaluations} evaluations"]]
+    rows = [["sizes", sizes]] if sizes else []
+    rows.append(["iterations", f"{outcome.iterations}, {outcome.evaluations} evaluations"])
     if done.tighter:
         rows.append(["verified with", done.tighter])
     if done.difference is not None:

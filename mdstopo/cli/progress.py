@@ -63,8 +63,10 @@ def line(progress: "Progress") -> str:
 
 
 def _objective(progress: "Progress") -> str:
-    """The value of the iterate, or that it has none."""
-    return "none (failed)" if math.isnan(progress.objective) else number(progress.objective, 7)
+    """The value of the iterate, or that it has none, and why."""
+    if not math.isnan(progress.objective):
+        return number(progress.objective, 7)
+    return f"none (failed: {progress.failure})" if progress.failure else "none (failed)"
 
 
 class Plain(displays.Plain["Progress"]):

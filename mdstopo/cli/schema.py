@@ -44,12 +44,14 @@ def command(section: str | None, space: bool, out: Path | None) -> int:
 
 def _keys(section: str, space: bool) -> str:
     """The keys of a section of a case, a line or more for each."""
-    from mdstopo.case.schema.key_tables import lines_of, places
+    from mdstopo.case.schema.key_tables import lines_of, places, sections_with
     from mdstopo.case.schema.schema_case import FORMAT
     from mdstopo.case.schema.schema_space import SPACE_FORMAT
 
     case = SPACE_FORMAT if space else FORMAT
     known = {name or "case": name for name, part in places(case).items() if part}
     if section not in known:
-        raise click.BadParameter(f"no section {section!r}; there are {', '.join(known)}", param_hint="SECTION")
+        there = " and ".join(f"`mdstopo schema {name}`" for name in sections_with(section, case))
+        told = f"; it is among the keys of {there}" if there else ""
+        raise click.BadParameter(f"no section {section!r}{told}; there are {', '.join(known)}", param_hint="SECTION")
     return "\n".join(lines_of(known[section], case))

@@ -1,6 +1,8 @@
 """`mdstopo show`: a result file in words."""
 
 import shlex
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -132,6 +134,16 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
             ]
         )
     output.table(rows)
+    _say_failures(output, view)
+
+
+def _say_failures(output: Output, view: "ResultView") -> None:
+    """Which iterates could not be evaluated, and why; those with one reason in a row together."""
+    iterates, reasons = view.arrays.get("failures/iterate", ()), view.lines("failures/reason")
+    for reason, each in groupby(zip(iterates, reasons, strict=True), key=itemgetter(1)):
+        failed = [int(k) for k, _ in each]
+        which = f"iterate {failed[0]}" if len(failed) == 1 else f"iterates {', '.join(map(str, failed))}"
+        output.say(f"{which} failed: {reason}")
 
 
 def _stages(columns: "Mapping[str, NDArray[Any]]") -> int:

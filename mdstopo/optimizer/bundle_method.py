@@ -20,7 +20,7 @@ from mdstopo.optimizer.competing_rows import (
 )
 from mdstopo.optimizer.gsao_state import GsaoState
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
-from mdstopo.optimizer.safeguards import is_least, residual_unit
+from mdstopo.optimizer.safeguards import is_least, nothing_is_left, residual_unit
 from mdstopo.optimizer.violations import merit, plain_violation, scaled_violation
 from mdstopo.settings.optimizer_presets import Settings
 
@@ -51,6 +51,8 @@ NO_DECREASE = 1e-13
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
 #: for a null step, both in shares of those levels
 DECISIVE, NOT_ABOVE = 1e-12, 1e-9
+#: share of the tolerance that a curvature may add to the model of all rows, which makes its least value unique
+UNIQUE = 1e-3
 #: multipliers of constraints that the residual may have at most, in penalties; share of the largest multiplier that its
 #: group can have above which a row has carried one
 BOUND, CARRIED = 1e3, 1e-6
@@ -89,7 +91,7 @@ class BundleMethod:
         if resists and (stuck or done or state.stagnation >= STAGNANT):
             self._restore(state)
             return True
-        return stuck and not done and self._reset(state)
+        return stuck and not done and not self._is_confirmed(state) and self._reset(state)
 
     def _begin(self, state: GsaoState, penalty: Floats | None = None) -> None:
         """Begin. penalty (J,): on violations from here on; None: that of `first_penalty`, and none while restoring."""
@@ -206,7 +208,34 @@ class BundleMethod:
         """Whether the last steps have changed next to nothing, or the model promises no decrease."""
         return state.small >= PATIENCE or not state.predicted > NO_DECREASE * abs(state.objective)
 
+    def most_to_gain(self, state: GsaoState) -> float:
+        """By how much the merit of any design can be below the iterate's, by all rows that are known; infinite where
+        that cannot be told.
+
+        No row of a convex problem lies above its function, and neither does the least value of their model, wherever
+        bounds and volume rows let a design be (C. Lemarechal, 1975). Where functions bend downwards, rows from
+        elsewhere may claim too much; so nothing is told before those from far off were dropped, and the others are
+        lowered by what was seen of the bending.
+        """
+        if state.restoring or not state.resets:
+            return float("inf")
+        here = state.bundle.subset(state.bundle.own).levels(len(state.penalty) + 1)
+        rows = state.bundle.lowered(here, state.concavity)
+        added = UNIQUE * self.settings.tolerance * abs(state.objective)
+        around = self.model.around(state.alpha, (np.inf, np.inf), state.steps[:0], state.changes[:0], 0.0)
+        trial = around.flat(2.0 * added / len(state.alpha)).solve(rows, state.penalty)
+        if not trial.solved:
+            return float("inf")
+        least = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty) - added
+        return max(merit(here[0], here[1:], state.penalty) - least, 0.0)
+
     # -- how
+
+    def _is_confirmed(self, state: GsaoState) -> bool:
+        """Whether rows that were found after others had been dropped leave nothing to be gained."""
+        return state.violation <= self.settings.tolerance and nothing_is_left(
+            state, self.most_to_gain(state), self.settings.tolerance
+        )
 
     def _trust_after_step(self, trust: float, size: float, ratio: float) -> float:
         """The box after an accepted step of this size, both in ranges; ratio: of actual to predicted decrease."""

@@ -127,7 +127,11 @@ class Gsao:
     def terminate(self, state: State) -> tuple[RunStatus, str]:
         """Whether a state goes on, and if not why."""
         assert isinstance(state, GsaoState)
-        return verdict(state, self._is_stuck(state), self.settings, self.objective_bound)
+        stuck = self._is_stuck(state)
+        to_gain = float("inf")
+        if stuck and state.uses_bundle and self.bundle is not None:
+            to_gain = self.bundle.most_to_gain(state)
+        return verdict(state, stuck, self.settings, self.objective_bound, to_gain)
 
     # The steps of the loop.
 

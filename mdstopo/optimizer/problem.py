@@ -97,6 +97,13 @@ class Sample:
     info: Mapping[str, Floats | float] = field(default_factory=dict)
 
     @property
+    def failure(self) -> str:
+        """Why the evaluation failed, in words; empty where it did not."""
+        if self.status is Status.OK:
+            return ""
+        return f"{self.status.value} ({self.message})" if self.message else self.status.value
+
+    @property
     def groups(self) -> Ints:
         """The constraint that each constraint row belongs to (C,)."""
         return self.constraint_groups if len(self.constraint_groups) else np.arange(len(self.constraint_rows))

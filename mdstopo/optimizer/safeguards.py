@@ -61,7 +61,7 @@ def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
         if known and len(sample.rows) and finite(steepest(sample.gradients)):
             return ""
         return Status.NON_FINITE.value
-    return f"{sample.status.value} ({sample.message})" if sample.message else sample.status.value
+    return sample.failure
 
 
 def cuts_of(state: GsaoState, sample: Sample) -> tuple[Floats, Floats, bool]:
@@ -157,10 +157,13 @@ def next_shift(shift: Floats, last: Step, step: Step, settings: Settings) -> Flo
     return np.clip(shift * factor, settings.number("shift_minimum"), settings.number("shift_maximum"))
 
 
-def verdict(state: GsaoState, stuck: bool, settings: Settings, bound: float = -inf) -> tuple[RunStatus, str]:
+def verdict(
+    state: GsaoState, stuck: bool, settings: Settings, bound: float = -inf, to_gain: float = inf
+) -> tuple[RunStatus, str]:
     """Whether to go on, and if not, why: a function of the state alone, so that a resumed run decides alike.
 
-    stuck: whether the next step would change next to nothing, or the last ones have. bound: no U is below it.
+    stuck: whether the next step would change next to nothing, or the last ones have. bound: no U is below it. to_gain:
+    what the rows that are known leave to be gained by any design, as `BundleMethod.most_to_gain` tells it.
     """
     if state.status is RunStatus.FAILED:
         return state.status, state.reason
@@ -174,6 +177,11 @@ def verdict(state: GsaoState, stuck: bool, settings: Settings, bound: float = -i
         return RunStatus.CONVERGED, (
             f"the objective, {state.best_objective:.2g}, cannot be below {bound:g}, and what is left is within the "
             f"tolerance {settings.tolerance:.2g} of what the first design had to lose"
+        )
+    if stuck and holds and nothing_is_left(state, to_gain, settings.tolerance):
+        return RunStatus.CONVERGED, (
+            f"the slopes here and of designs tried beside it leave at most {to_gain / abs(state.objective):.2g} of the "
+            f"objective to be gained, which is within the tolerance {settings.tolerance:.2g}"
         )
     if state.restoring and (stuck or is_least(state, settings.tolerance)):
         return _without_limits(state, settings)
@@ -210,6 +218,11 @@ def is_at_bound(state: GsaoState, tolerance: float, bound: float) -> bool:
     if not isfinite(bound) or state.best_violation > tolerance:
         return False
     return state.best_objective - bound <= tolerance * (state.history.objective[0] - bound)
+
+
+def nothing_is_left(state: GsaoState, to_gain: float, tolerance: float) -> bool:
+    """Whether what is left to be gained, as `BundleMethod.most_to_gain` tells it, is within a share of U."""
+    return to_gain < tolerance * abs(state.objective)
 
 
 def is_least(state: GsaoState, tolerance: float) -> bool:

@@ -30,7 +30,8 @@ class History:
     constraints (K+1, m): A x - b. nonlinear (K+1, J): the largest c of each constraint. change (K+1,): largest
     |change of alpha| against the iterate that the step started from. evaluations (K+1,): so far. seconds (K+1,): wall
     time so far. kkt (K+1,): projected KKT residual at the iterate, after the design was taken or not, relative to the
-    largest |dU/dalpha|. accepted (K+1,): was the design taken?
+    largest |dU/dalpha|. accepted (K+1,): was the design taken? failure (K+1,): why the evaluation failed, in words;
+    empty where it did not.
     """
 
     objective: list[float] = field(default_factory=list)
@@ -41,6 +42,7 @@ class History:
     seconds: list[float] = field(default_factory=list)
     kkt: list[float] = field(default_factory=list)
     accepted: list[bool] = field(default_factory=list)
+    failure: list[str] = field(default_factory=list)
     info: dict[str, list[Floats]] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -81,6 +83,7 @@ class History:
             [*self.seconds, seconds],
             [*self.kkt, kkt],
             [*self.accepted, accepted],
+            [*self.failure, sample.failure],
             {name: [*self.info.get(name, []), row] for name, row in rows.items()},
         )
 
@@ -88,9 +91,11 @@ class History:
         """Every column as an array, by name; the columns of `info` as `info/<name>`."""
         out: dict[str, Array] = {}
         for f in fields(self):
-            if f.name != "info":
+            if f.name not in ("info", "failure"):
                 out[f.name] = np.array(getattr(self, f.name), dtype=_COLUMN_TYPES.get(f.name, np.float64))
         out |= {f"info/{name}": np.array(rows, dtype=np.float64) for name, rows in self.info.items()}
+        if any(self.failure):
+            out["failure"] = _bytes("\0".join(self.failure))
         return out
 
     @classmethod
@@ -99,12 +104,15 @@ class History:
         out = cls()
         for name, column in arrays.items():
             head, _, key = name.partition("/")
-            if head == "info":
+            if name == "failure":
+                out.failure = _text(column).split("\0")
+            elif head == "info":
                 out.info[key] = list(np.asarray(column, dtype=np.float64))
             elif column.ndim == 1:
                 setattr(out, name, column.tolist())
             else:
                 setattr(out, name, list(np.asarray(column, dtype=np.float64)))
+        out.failure = out.failure or [""] * len(out)
         return out
 
 

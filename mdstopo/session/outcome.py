@@ -27,7 +27,8 @@ class Progress:
 
     start, starts: which of how many, from 0. iteration: of all stages of this start, as max_iterations. objective: U at
     this design (NaN where its evaluation failed); best: the lowest so far in this stage; violation: largest excess over
-    a constraint, in the constraint's unit; change: largest |change of alpha|; evaluations: of this start so far.
+    a constraint, in the constraint's unit; change: largest |change of alpha|; evaluations: of this start so far;
+    failure: why the evaluation failed, in words, empty where it did not.
     """
 
     start: int
@@ -39,6 +40,7 @@ class Progress:
     violation: float
     change: float
     evaluations: int
+    failure: str = ""
 
     @classmethod
     def of(cls, state: State, start: int, starts: int, max_iterations: int) -> "Progress":
@@ -55,6 +57,7 @@ class Progress:
             violation=float(rows.max(initial=0.0)),
             change=float(history.change[-1]),
             evaluations=int(state.evaluations),
+            failure=history.failure[-1],
         )
 
 

@@ -77,12 +77,24 @@ def run_part(case: Case, states: Sequence[State | None], before: int = 0, final:
     if case.movable or any(each.moved for each in case.variables):
         part |= ends_part(as_designed(case, design))
     part |= {f"iterations/{name}": column for name, column in iteration_columns(case, state, before, final).items()}
+    part |= _failures_part(state)
     if len(states) > 1:
         part |= _starts_part(case, states)
     for index, each in enumerate(states):
         if each is not None:
             part |= {f"optimizer/{index}/{name}": array for name, array in each.to_arrays().items()}
     return part
+
+
+def _failures_part(state: State) -> Datasets:
+    """The iterates whose evaluation failed, and why; nothing where none did."""
+    failed = [k for k, words in enumerate(state.history.failure) if words]
+    if not failed:
+        return {}
+    return {
+        "failures/iterate": np.array(failed, dtype=np.int64),
+        "failures/reason": [state.history.failure[k] for k in failed],
+    }
 
 
 def _starts_part(case: Case, states: Sequence[State | None]) -> Datasets:

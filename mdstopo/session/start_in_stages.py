@@ -125,6 +125,7 @@ def continued(before: State, fresh: State) -> State:
         [*old.seconds, *(before.seconds + each for each in new.seconds)],
         [*old.kkt, *new.kkt],
         [*old.accepted, *new.accepted],
+        [*old.failure, *new.failure],
         info,
     )
     evaluations, seconds = before.evaluations + fresh.evaluations, before.seconds + fresh.seconds

@@ -27,6 +27,7 @@ _KNOWN = frozenset(
         "combine",
         "design",
         "differences",
+        "failures",
         "files",
         "fit",
         "iterations",

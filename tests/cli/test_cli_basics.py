@@ -150,6 +150,19 @@ def test_a_section_that_there_is_not_is_told_with_those_that_there_are(capsys: p
     assert "no section 'objectivs'; there are case, time, bodies, " in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("word", "sections"), [("laws", ("members",)), ("spring", ("members",)), ("joint_moment", ("objectives",))]
+)
+def test_a_word_that_stands_below_a_section_is_told_with_that(
+    word: str, sections: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_group(["schema", word]) == 2
+    told = capsys.readouterr().err
+    assert f"no section '{word}'; it is among the keys of " in told
+    for section in sections:
+        assert f"`mdstopo schema {section}`" in told
+
+
 def test_keys_in_space_are_asked_for_with_a_section(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_group(["schema", "--space"]) == 2
     assert "--space goes with a SECTION" in capsys.readouterr().err

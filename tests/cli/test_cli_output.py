@@ -103,6 +103,11 @@ def test_progress_says_that_an_iterate_has_no_value() -> None:
     assert "nan" not in line(progress(objective=float("nan")))
 
 
+def test_progress_says_why_an_iterate_has_no_value() -> None:
+    said = line(progress(objective=float("nan"), failure="the step became too small (belts[3])"))
+    assert "objective none (failed: the step became too small (belts[3])), best" in said
+
+
 def test_a_condensed_history_has_both_ends_and_few_rows() -> None:
     for count in (1, 2, 11, 12, 13, 51, 1000):
         rows = condensed(count)

@@ -478,6 +478,12 @@ def test_a_machine_that_falls_to_another_equilibrium_is_not_accepted(
         r"rests 1\.\d+ m \(body 'mast'\) .* at another equilibrium: .*; keep more", document["not_written"]
     )
     assert document["not_written"] in err
+    status, said, _ = call(capsys, "finalize", str(mast), "--keep", "1", "--out", str(out))
+    assert status == 1
+    head, sizes = said.splitlines()[0], re.search(r"^  sizes +(.*)$", said, re.MULTILINE)
+    assert re.search(r": not written - the .*; keep more members$", head), head
+    assert sizes is not None
+    assert sizes[1].startswith(document["status"].replace("_", " "))
 
 
 def test_a_machine_that_rests_where_the_full_one_does_is_accepted_and_a_long_way_is_told(

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import h5py
 import pytest
 
 from mdstopo.cli.group import run_group
+from mdstopo.session.run_session import run_session
+from tests.fakes import FakeEngineWithEvaluations, hand_made_case, limited
 
 from .pages import DOCS, blocks
 from .test_pages import run
@@ -122,6 +126,10 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
             "sweep set boat.yaml members.belts.law.stiffness=4000,5000 optimizer.max_iterations=1",
         ):
             assert run_group([*command.split(), "--quiet"]) == 0, command
+    # designs that cannot be computed
+    failing = partial(FakeEngineWithEvaluations, fail_from=5)
+    case = replace(limited(hand_made_case(), 6), files={})
+    run_session(case, path=folder / "results" / "failing.h5", engine=failing)
     found: set[str] = set()
     for path in sorted(Path(folder, "results").glob("*.h5")):
         with h5py.File(path) as file:

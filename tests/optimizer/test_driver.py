@@ -347,6 +347,18 @@ def test_resuming_from_stored_arrays_is_exact(preset, k):
     same(run(Gsao(problem, settings(preset, max_iterations=12, tolerance=0.0)), resumed), straight)
 
 
+def test_why_evaluations_failed_is_kept_with_a_state_and_older_states_have_no_reasons():
+    problem, _ = compliance_problem()
+    optimizer = Gsao(failing(problem, {2}), settings(max_iterations=4, tolerance=0.0))
+    state = run(optimizer)
+    words = f"{Status.ZERO_LENGTH.value} (belts[3])"
+    assert state.history.failure == ["", "", words, "", ""]
+    arrays = state.to_arrays()
+    same(State.from_arrays(arrays), state)
+    del arrays["history/failure"]
+    assert State.from_arrays(arrays).history.failure == [""] * 5
+
+
 def test_a_raised_limit_continues_a_finished_run_exactly():
     problem, _ = compliance_problem()
     short = run(Gsao(problem, settings(max_iterations=4, tolerance=0.0)))

@@ -127,3 +127,62 @@ def test_what_is_told_of_a_converged_run_is_the_design_that_has_converged() -> N
     assert state.status is RunStatus.CONVERGED
     assert np.array_equal(state.best_alpha, state.alpha)
     assert state.best_objective == state.objective
+
+
+def rounded(constant, seed=0, n=8):
+    """The length of one linear quantity with a constant in its square: smooth, but bent within sqrt(constant) of its
+    least value, which is that."""
+    rng = np.random.default_rng(seed)
+    slope, level = rng.uniform(0.2, 1.0, n), rng.uniform(0.05, 0.3)
+
+    def functions(x):
+        away = slope @ x - level
+        value = np.sqrt(away**2 + constant)
+        return np.array([value]), (away / value * slope)[None]
+
+    return Toy(functions, np.full(n, 0.4), 0.0, 1.0)
+
+
+def test_an_optimum_that_bends_on_a_small_scale_has_converged_where_slopes_beside_it_leave_nothing_to_gain() -> None:
+    """The slope at the design is steep until next to the optimum, so that the residual is large at the best of designs
+    that can be told apart."""
+    for seed, constant in enumerate((1e-6, 1e-8)):
+        state = ended(rounded(constant, seed))
+        assert state.status is RunStatus.CONVERGED
+        assert state.kkt > 1e-4
+        assert "leave at most" in state.reason
+        assert 0.0 <= state.best_objective - np.sqrt(constant) <= 1e-9 * np.sqrt(constant)
+
+
+def test_what_is_left_to_gain_is_never_less_than_what_a_convex_objective_lies_above_its_optimum() -> None:
+    problem = rounded(1e-6)
+    problem.competes = True
+    optimizer = Gsao(problem, settings())
+    told = []
+
+    def look(state) -> None:
+        state = state.copy()
+        state.resets = 1  # as if rows from far off had been dropped
+        to_gain = optimizer.bundle.most_to_gain(state)
+        told.append(to_gain / state.objective)
+        assert to_gain >= (state.objective - 1e-3) * (1.0 - 1e-9)
+
+    run(optimizer, on_iteration=look)
+    assert max(told) > 0.5
+    assert min(told) < 1e-8
+
+
+def test_nothing_is_told_of_what_is_left_before_rows_from_far_off_were_dropped() -> None:
+    problem = rounded(1e-6)
+    problem.competes = True
+    optimizer = Gsao(problem, settings())
+    state = optimizer.start()
+    assert state.resets == 0
+    assert optimizer.bundle.most_to_gain(state) == np.inf
+
+
+def test_a_run_that_ends_although_something_is_left_to_gain_has_not_converged() -> None:
+    """Steps that gain less than half count as none: short ones end the run far above the optimum."""
+    state = ended(rounded(1e-6), overrides={"decrease_tolerance": 0.5, "trust_start": 1e-4, "trust_grow": 1.0})
+    assert state.best_objective > 2e-3
+    assert state.status is RunStatus.STALLED

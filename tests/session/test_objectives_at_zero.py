@@ -7,6 +7,7 @@ from mdstopo import optimize
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.design_problem import lower_bound_of
+from tests.docs.pages import DOCS, blocks
 
 #: an arm that springs without free length balance exactly, where their moments add up to its weight's
 ARM = """
@@ -44,6 +45,19 @@ def test_a_balanced_arm_has_converged(response: str, reduction: str) -> None:
     assert done.status == "converged", done.reason
     assert done.objectives["sag"] < 1e-7 * done.initial_objectives["sag"]
     assert not any("stalled" in each for each in done.warnings)
+
+
+def test_a_drive_that_has_nothing_to_hold_has_converged_and_its_springs_balance_the_arm_exactly() -> None:
+    """Of springs from height h on the post to a on the arm, sum alpha k h a = m g r (closed form)."""
+    page = (DOCS / "expressions.md").read_text(encoding="utf-8")
+    (text,) = [block.text for block in blocks(page) if block.title == "balance.yaml"]
+    case = read_case(text)
+    done = optimize(case)
+    assert done.status == "converged", done.reason
+    assert 0.0 <= done.objectives["held"] - 1e-3 <= 1e-9
+    (springs,) = case.members
+    moment = 200.0 * float(done.alpha @ (springs.p_world[:, 1] * springs.q_world[:, 0]))
+    assert moment == pytest.approx(2.0 * 9.81 * 0.4, abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ import pytest
 
 from mdstopo.case.model import Case, VolumeRow
 from mdstopo.case.text.errors import CaseError
+from mdstopo.cli.group import run_group
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.run_session import run_session
 from mdstopo.status import RunStatus, Status
@@ -194,7 +195,21 @@ def test_a_run_that_fails_keeps_its_best_design_and_says_why(case: Case, tmp_pat
     view = read_result(tmp_path / "a.h5")
     assert view.status == "failed"
     assert view.alpha.tobytes() == outcome.alpha.tobytes()
-    assert np.isnan(view.under("iterations")["objectives"][5:]).all()
+    failed = np.flatnonzero(np.isnan(view.under("iterations")["objectives"][:, 0]))
+    assert failed.tolist() == list(range(3, len(view.under("iterations")["objectives"])))
+    assert view.array("failures/iterate").tolist() == failed.tolist()
+    assert set(view.lines("failures/reason")) == {Status.NON_FINITE.value}
+
+
+def test_show_tells_which_iterates_failed_and_why_in_one_line(case: Case, tmp_path: Path, capsys) -> None:
+    run_session(limited(case, 6), path=tmp_path / "a.h5", engine=partial(FakeEngineWithEvaluations, fail_from=5))
+    assert run_group(["show", str(tmp_path / "a.h5")]) == 0
+    assert f"iterates 3, 4, 5, 6 failed: {Status.NON_FINITE.value}\n" in capsys.readouterr().out
+
+
+def test_a_run_without_failures_keeps_none(case: Case, tmp_path: Path) -> None:
+    go(limited(case, 3), tmp_path / "a.h5")
+    assert not read_result(tmp_path / "a.h5").lines("failures/reason")
 
 
 def test_a_first_design_that_fails_ends_the_run_with_a_reason(case: Case, tmp_path: Path) -> None:

@@ -43,6 +43,17 @@ def places(case: Record = FORMAT) -> dict[str, list[Place]]:
     return {"": [Place("", case, 0)], **found, ROWS: [Place(path, each, 0) for path, each in _SHARED.items()]}
 
 
+def sections_with(word: str, case: Record = FORMAT) -> list[str]:
+    """The keys of a case below which a word, or what it is the plural of, is a key or names one of several mappings,
+    as a law or a joint."""
+    names = {word, word.removesuffix("s")}
+    return [
+        section
+        for section, part in places(case).items()
+        if section and any(names & {*each.path.split("."), *(key.name for key in each.record.keys)} for each in part)
+    ]
+
+
 def keys_in_space(section: str) -> str:
     """The same of a case in space, for a page that has `IN_SPACE` alone; other links lead to the page of the case."""
     known = places(SPACE_FORMAT)
