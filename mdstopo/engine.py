@@ -545,8 +545,8 @@ class Evaluator:
         status, steps = driver.simulate(design)
         if status.ok:  # the motion alone; it was to be computed again with steps that integrals over time need
             return result.status, (
-                "with the steps that integrals over time need, very many where one is next to zero: there add a small "
-                "amount to its response by an expression"
+                "with the steps that integrals over time need; an integral next to zero needs very many: add a small "
+                "amount to its response, by an expression"
             )
         return driver.explain(design, status, float(steps.t[-1]), steps.q[-1], steps.v[-1])
 

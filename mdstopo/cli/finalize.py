@@ -110,7 +110,7 @@ def command(
     output.document(_document(done, place))
     for warning in (*_warnings(done), *(each for each in map(_trouble, done.columns) if each)):
         output.notice(f"warning: {warning}")
-    if not done.text:
+    if not done.text and (quiet or as_json):  # else it stands first
         output.notice(f"{place} is not written: {_why(done)}")
     return EXIT[done.outcome.status] or (0 if done.text else 1)
 

@@ -57,16 +57,19 @@ def line(progress: "Progress") -> str:
     start = f"start {progress.start + 1}/{progress.starts}, " if progress.starts > 1 else ""
     return (
         f"{start}iteration {progress.iteration}/{progress.max_iterations}: "
-        f"objective {_objective(progress)}, best {number(progress.best, 7)}, "
+        f"objective {_objective(progress)}{_why(progress)}, best {number(progress.best, 7)}, "
         f"constraint {number(progress.violation, 3)}, change {number(progress.change, 3)}"
     )
 
 
 def _objective(progress: "Progress") -> str:
-    """The value of the iterate, or that it has none, and why."""
-    if not math.isnan(progress.objective):
-        return number(progress.objective, 7)
-    return f"none (failed: {progress.failure})" if progress.failure else "none (failed)"
+    """The value of the iterate, or that it has none."""
+    return "none (failed)" if math.isnan(progress.objective) else number(progress.objective, 7)
+
+
+def _why(progress: "Progress") -> str:
+    """Why the iterate has no value, where that is known; for lines, as a table has no room for it."""
+    return f": {progress.failure}" if progress.failure else ""
 
 
 class Plain(displays.Plain["Progress"]):

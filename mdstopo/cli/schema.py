@@ -51,7 +51,8 @@ def _keys(section: str, space: bool) -> str:
     case = SPACE_FORMAT if space else FORMAT
     known = {name or "case": name for name, part in places(case).items() if part}
     if section not in known:
-        there = " and ".join(f"`mdstopo schema {name}`" for name in sections_with(section, case))
+        asked = "{} --space" if space else "{}"
+        there = " and ".join(f"`mdstopo schema {asked.format(name)}`" for name in sections_with(section, case))
         told = f"; it is among the keys of {there}" if there else ""
         raise click.BadParameter(f"no section {section!r}{told}; there are {', '.join(known)}", param_hint="SECTION")
     return "\n".join(lines_of(known[section], case))

@@ -1,8 +1,6 @@
 """`mdstopo show`: a result file in words."""
 
 import shlex
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +21,7 @@ if TYPE_CHECKING:
     from mdstopo.store.result_reader import ResultView
 
 _ROWS = 12  # iterates that a condensed history shows
+_SHOWN = 6  # iterates that are named of those that failed for one reason
 
 
 @click.command("show")
@@ -138,12 +137,25 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
 
 
 def _say_failures(output: Output, view: "ResultView") -> None:
-    """Which iterates could not be evaluated, and why; those with one reason in a row together."""
-    iterates, reasons = view.arrays.get("failures/iterate", ()), view.lines("failures/reason")
-    for reason, each in groupby(zip(iterates, reasons, strict=True), key=itemgetter(1)):
-        failed = [int(k) for k, _ in each]
-        which = f"iterate {failed[0]}" if len(failed) == 1 else f"iterates {', '.join(map(str, failed))}"
+    """Which iterates could not be evaluated, and why; those with the same reason together, of many only the first."""
+    by_reason: dict[str, list[int]] = {}
+    for k, reason in _failures(view):
+        by_reason.setdefault(reason, []).append(k)
+    for reason, failed in by_reason.items():
+        more = f", ... ({len(failed)})" if len(failed) > _SHOWN else ""
+        which = f"iterate{'s' if len(failed) > 1 else ''} {', '.join(map(str, failed[:_SHOWN]))}{more}"
         output.say(f"{which} failed: {reason}")
+
+
+def _failures(view: "ResultView") -> list[tuple[int, str]]:
+    """The iterates that could not be evaluated, and why. Raises DamagedError where the file has not both for each."""
+    from mdstopo.store.store_errors import DamagedError
+
+    reasons = view.lines("failures/reason")
+    iterates = view.array("failures/iterate").tolist() if reasons else []
+    if len(iterates) != len(reasons):
+        raise DamagedError(f"{view.path}: damaged: failures/iterate and failures/reason are not of one length")
+    return list(zip(map(int, iterates), reasons, strict=True))
 
 
 def _stages(columns: "Mapping[str, NDArray[Any]]") -> int:
@@ -274,6 +286,7 @@ def _document(view: "ResultView") -> dict[str, Any]:
         content["iterations"] = len(columns["combined"]) - _stages(columns)
         content["evaluations"] = int(columns["evaluations"][-1])
         content["kkt"] = residual_of(view)
+        content["failures"] = [{"iterate": k, "reason": reason} for k, reason in _failures(view)]
         content["objectives"] = {name: columns["objectives"][:, i] for i, name in enumerate(objective_names(view))}
     if variables := view.under("design/variables"):
         content["variables"] = variables

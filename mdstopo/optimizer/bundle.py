@@ -116,6 +116,18 @@ class Bundle:
         unit = np.where(known[:, None], vector / np.where(known, size, 1.0)[:, None], [1.0, 0.0])
         return np.asarray(unit[:, :1] * self.slope + unit[:, 1:] * self.across)
 
+    def tangent(self, weights: Floats, d: Floats) -> tuple[float, Floats]:
+        """The sum with weights (K,) of the rows' tangents at a step d (N,), below which no row lies: its value at the
+        iterate, and its gradient (N,)."""
+        if isinstance(self.slope, Stack):  # lines, whose rows are not copied
+            gradient = np.zeros(self.slope.n)
+            for weight, row in zip(weights.tolist(), self.slope.rows, strict=True):
+                if weight != 0.0:
+                    gradient += weight * row
+            return float(weights @ self.values()), gradient
+        slopes = self.slopes_at(d)
+        return float(weights @ (self.values_at(d) - slopes @ d)), np.asarray(weights @ slopes)
+
     def levels(self, groups: int) -> Floats:
         """The largest value of each group (groups,) at the iterate, -inf of one without rows."""
         return largest_of_groups(self.values(), self.group, groups)

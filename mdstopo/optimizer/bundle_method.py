@@ -17,6 +17,7 @@ from mdstopo.optimizer.competing_rows import (
     Around,
     RowModel,
     Trial,
+    lower_bound,
 )
 from mdstopo.optimizer.gsao_state import GsaoState
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
@@ -51,7 +52,8 @@ NO_DECREASE = 1e-13
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
 #: for a null step, both in shares of those levels
 DECISIVE, NOT_ABOVE = 1e-12, 1e-9
-#: share of the tolerance that a curvature may add to the model of all rows, which makes its least value unique
+#: share of the tolerance that a curvature may add to the model of all rows, which makes the design where it is least
+#: unique
 UNIQUE = 1e-3
 #: multipliers of constraints that the residual may have at most, in penalties; share of the largest multiplier that its
 #: group can have above which a row has carried one
@@ -209,8 +211,8 @@ class BundleMethod:
         return state.small >= PATIENCE or not state.predicted > NO_DECREASE * abs(state.objective)
 
     def most_to_gain(self, state: GsaoState) -> float:
-        """By how much the merit of any design can be below the iterate's, by all rows that are known; infinite where
-        that cannot be told.
+        """By how much the merit of any design can be below the iterate's, at most, by all rows that are known; infinite
+        where that cannot be told.
 
         No row of a convex problem lies above its function, and neither does the least value of their model, wherever
         bounds and volume rows let a design be (C. Lemarechal, 1975). Where functions bend downwards, rows from
@@ -226,7 +228,7 @@ class BundleMethod:
         trial = around.flat(2.0 * added / len(state.alpha)).solve(rows, state.penalty)
         if not trial.solved:
             return float("inf")
-        least = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty) - added
+        least = lower_bound(rows, trial, state.alpha, self.model.space, state.penalty)
         return max(merit(here[0], here[1:], state.penalty) - least, 0.0)
 
     # -- how

@@ -83,7 +83,12 @@ class Around(Protocol):
 
 
 class RowModel(Protocol):
-    """What a problem's size decides of the bundle method: how subproblems are solved and steps are measured."""
+    """What a problem's size decides of the bundle method: how subproblems are solved and steps are measured.
+
+    space: the designs that bounds and linear rows allow.
+    """
+
+    space: FeasibleSet
 
     def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
         """The subproblems at x (N,), in a box of so many ranges and so far; steps, changes: as of `State`."""
@@ -241,6 +246,34 @@ def gradient_change(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats)
             change += weight * (fresh[best] - slope)
             matched = True
     return change if matched else None
+
+
+def lower_bound(rows: Bundle, trial: Trial, x: Floats, space: FeasibleSet, penalty: Floats) -> float:
+    """A value that the merit of the rows' model is nowhere below in the space: that of the dual problem.
+
+    Any multipliers would do: y of sum 1 of the objective's rows, of at most penalty (J,) of each constraint's, and lam
+    of linear rows, not negative where these are no equations. Then for every design z
+
+        merit(z) >= sum y_r m_r(z - x) + lam (A z - b),
+
+    and what is on the right is linear once rows are replaced by their tangents. Those of a trial come close to the
+    least merit, whatever digits its solver has missed.
+
+    rows (K,), seen from x (N,); trial: a step from there, with multipliers. Minus infinity where these say nothing.
+    """
+    y = np.maximum(trial.multipliers, 0.0)
+    total = np.bincount(rows.group, weights=y, minlength=len(penalty) + 1)
+    if not total[0] > 0.0:
+        return float("-inf")
+    share = np.minimum(1.0, penalty / np.maximum(total[1:], np.finfo(np.float64).tiny))
+    y *= np.concatenate([[1.0 / total[0]], share])[rows.group]
+    value, gradient = rows.tangent(y, trial.x - x)
+    if len(space.linear):
+        lam = np.where(space.linear.equal, trial.linear, np.maximum(trial.linear, 0.0))
+        value += float(lam @ space.linear.excess(x))
+        gradient = gradient + lam @ space.linear.A
+    least = np.minimum(gradient * (space.lower - x), gradient * (space.upper - x))
+    return value + float(np.einsum("i->", least))
 
 
 def curvature_of(steps: Floats, changes: Floats, steepest: float, range_: Floats) -> Curvature:

@@ -5,6 +5,7 @@ The interface is that of `interface`.
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -16,7 +17,7 @@ from mdstopo.optimizer.gsao_state import GsaoState, RowDetails, Step
 from mdstopo.optimizer.interface import known_at_first
 from mdstopo.optimizer.nearest_feasible import project
 from mdstopo.optimizer.problem import Floats, Problem, Sample
-from mdstopo.optimizer.safeguards import failure, no_cuts, verdict
+from mdstopo.optimizer.safeguards import no_cuts, verdict, why_unusable
 from mdstopo.optimizer.separable import SeparableMethod
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State
@@ -25,7 +26,7 @@ from mdstopo.optimizer.wide import Measures, Space, ranges
 from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.optimizer.wide_rows import WideModel
 from mdstopo.settings.optimizer_presets import Settings
-from mdstopo.status import RunStatus
+from mdstopo.status import RunStatus, Status
 
 # Share of U by which a design may be better than the iterate that has converged, by what it breaks limits within their
 # tolerance.
@@ -86,7 +87,7 @@ class Gsao:
         first = self.problem.initial if initial is None else initial
         alpha = project(np.asarray(first, dtype=np.float64), self.lower, self.upper, self.problem.linear)
         sample = self.problem.evaluate(alpha)
-        wrong = failure(sample, self._measures.steepest)
+        sample, wrong = self._usable(sample)
         state = self._first_state(alpha, sample, bool(wrong))
         if wrong:
             state.status = RunStatus.FAILED
@@ -113,7 +114,7 @@ class Gsao:
         tried, origin = state.trial, state.alpha
         sample = self.problem.evaluate(tried)
         self._measures.look(sample.gradients, tried)
-        wrong = failure(sample, self._measures.steepest)
+        sample, wrong = self._usable(sample)
         accepted = False
         if wrong:
             self._retreat(state, wrong)
@@ -123,6 +124,13 @@ class Gsao:
             self._propose(state)
         change, _ = self._measures.change(tried, origin)
         return self._finish(state, sample, tried, change, accepted, began)
+
+    def _usable(self, sample: Sample) -> tuple[Sample, str]:
+        """The sample, and why it cannot be used, in words; one whose numbers are not finite has a status that says so,
+        as the history keeps it."""
+        wrong = why_unusable(sample, self._measures.steepest)
+        unmarked = wrong and sample.status is Status.OK
+        return (replace(sample, status=Status.NON_FINITE) if unmarked else sample), wrong
 
     def terminate(self, state: State) -> tuple[RunStatus, str]:
         """Whether a state goes on, and if not why."""

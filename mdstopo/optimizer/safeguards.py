@@ -53,7 +53,7 @@ def residual_unit(state: GsaoState, steepest: float, steepest_row: float = 0.0) 
     return max(steepest, GRADIENT_SHARE * state.largest_gradient)
 
 
-def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
+def why_unusable(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
     """Why a sample cannot be used, as a sentence; empty if it can. steepest: as `wide.steepest`."""
     if sample.status is Status.OK:
         numbers = (sample.rows, sample.constraint_rows, sample.constraint_gradients)

@@ -26,9 +26,9 @@ from mdstopo.scene.quaternions import product, quaternions_of
 MOST = 1000
 #: between two frames no body turns by more (rad); frames of an animation, at least and at most
 TURN, FEWEST, LONGEST = 0.2, 121, 4001
-#: up to how much turn within a step of the integrator (rad) its ends are enough to know what is between them; and by
-#: how much of the scene's size, or of a radian, their accelerations may bend that
-SMOOTH, BENT = 0.8, 2e-4
+#: up to how much turn within a step of the integrator (rad) cubics between its ends may be taken; and by how much of
+#: the scene's size, or of a radian, these may be off
+SMOOTH, CUBIC_ERROR = 0.8, 2e-4
 #: shares of the scene's size: radius of the thickest member, of the thinnest, and of joints
 THICK, THIN, JOINT = 0.006, 0.001, 0.012
 #: share of the scene's size between the axes of members of the same two points: the thickest do not touch
@@ -70,7 +70,7 @@ class _Scene:
         cloud = [_lifted(self.case, ends_at(self.case, group, start)).reshape(-1, 3) for group in self.case.members]
         cloud += [self.first.place[0], *(shape.corners for shape in shapes.values())]
         self.size = max(float(np.linalg.norm(np.ptp(np.concatenate(cloud), axis=0))), 1e-9)
-        self.motions = {name: _motion(source, name, BENT * self.size) for name in source.load_cases}
+        self.motions = {name: _motion(source, name, CUBIC_ERROR * self.size) for name in source.load_cases}
         self.shapes = shapes
         self.touched = surfaces_of(self.case) if self.case.dimension > 2 else []
         #: by node: where it is in every load case, to be animated
@@ -225,12 +225,12 @@ class _Scene:
             self.out.add("animations", name=name, samplers=samplers, channels=channels, extras=extras)
 
 
-def _motion(source: Source, load_case: str, bent: float) -> Poses:
+def _motion(source: Source, load_case: str, allowed: float) -> Poses:
     """The motion at even times, close enough for the turns of bodies.
 
     Between the steps that the file has, cubic polynomials with their rates; where bodies turn too far within a step,
-    where these polynomials may be off by more than `bent` (m, or BENT of a radian), and where the file has no motion of
-    the design, it is simulated again.
+    where these polynomials may be off by more than `allowed` (m) or CUBIC_ERROR (rad), and where the file has no motion
+    of the design, it is simulated again.
     """
     case = source.case
     stored = source.view.under(f"trajectories/{load_case}")
@@ -238,7 +238,7 @@ def _motion(source: Source, load_case: str, bent: float) -> Poses:
     if stored and "v" in stored and "a" in stored and len(stored["t"]) > 1:
         t, q, v, a = (np.asarray(stored[name], dtype=np.float64) for name in ("t", "q", "v", "a"))
         turned = float((_spins(case, v)[:-1] * np.diff(t)[:, None]).max(initial=0.0))
-        if turned <= SMOOTH and _is_straight(case, (t, q, v, a), bent):
+        if turned <= SMOOTH and _cubics_suffice(case, (t, q, v, a), allowed):
             found = CubicHermiteSpline(t, q, _slopes(case, q, v))
     if found is None:
         motion = source.engine.trajectory(source.design, load_case)
@@ -251,23 +251,23 @@ def _motion(source: Source, load_case: str, bent: float) -> Poses:
     return _poses(case, times, found(times))
 
 
-def _is_straight(case: Case, states: tuple[Floats, Floats, Floats, Floats], bent: float) -> bool:
-    """Whether the quintics that have also the accelerations at the ends of steps are near the cubics that have not.
+def _cubics_suffice(case: Case, states: tuple[Floats, Floats, Floats, Floats], allowed: float) -> bool:
+    """Whether the cubics through coordinates and their rates differ little from the quintics that keep their second
+    derivatives, too.
 
-    states: times (T,), coordinates, velocities, accelerations. bent: how far apart they may be in places (m); in a
-    plane in angles BENT (rad).
+    states: times (T,), coordinates, velocities, accelerations. allowed: how far apart they may be in places (m); in
+    turns it is CUBIC_ERROR (rad).
     """
-    t, *states_at = states
-    count = len(case.bodies)
-    # coordinates of bodies that are numbers: all in a plane, in space places alone
-    q, v, a = (each.reshape(len(t), count, -1)[..., :3] for each in states_at)
-    h = np.diff(t)[:, None, None]
+    t, q, v, a = states
+    slope, bend = _slopes(case, q, v), _second_slopes(case, q, v, a)
+    h = np.diff(t)[:, None]
     mean = np.diff(q, axis=0) / h
-    first = (6.0 * mean - 4.0 * v[:-1] - 2.0 * v[1:]) / h  # the cubics' second derivatives at both ends
-    last = (-6.0 * mean + 2.0 * v[:-1] + 4.0 * v[1:]) / h
-    apart = h**2 / 64.0 * (np.abs(a[:-1] - first) + np.abs(a[1:] - last))
-    allowed = np.array([bent, bent, BENT if case.dimension == 2 else bent])
-    return bool(np.all(apart <= allowed))
+    first = (6.0 * mean - 4.0 * slope[:-1] - 2.0 * slope[1:]) / h  # the cubics' second derivatives at both ends
+    last = (-6.0 * mean + 2.0 * slope[:-1] + 4.0 * slope[1:]) / h
+    apart = h**2 / 64.0 * (np.abs(bend[:-1] - first) + np.abs(bend[1:] - last))
+    # an entry of a quaternion changes by half of the angle at most
+    own = [allowed] * 2 + [CUBIC_ERROR] if case.dimension == 2 else [allowed] * 3 + [0.5 * CUBIC_ERROR] * 4
+    return bool(np.all(apart <= np.tile(own, len(case.bodies))))
 
 
 def _even(case: Case, t: Floats, v: Floats) -> Floats:
@@ -296,6 +296,21 @@ def _slopes(case: Case, q: Floats, v: Floats) -> Floats:
         spin = np.concatenate([np.zeros((len(v), 1)), rate[:, 3:]], axis=1)
         slopes[:, 7 * b + 3 : 7 * b + 7] = 0.5 * product(spin, q[:, 7 * b + 3 : 7 * b + 7])
     return slopes
+
+
+def _second_slopes(case: Case, q: Floats, v: Floats, a: Floats) -> Floats:
+    """d2q/dt2; of the quaternion e of a body with the angular velocity w and acceleration w' it is
+    (0, w') e / 2 + (0, w) (0, w) e / 4."""
+    if case.dimension == 2:
+        return a
+    second = np.empty_like(q)
+    none = np.zeros((len(q), 1))
+    for b in range(len(case.bodies)):
+        turn = q[:, 7 * b + 3 : 7 * b + 7]
+        spin, gain = (np.concatenate([none, each[:, 6 * b + 3 : 6 * b + 6]], axis=1) for each in (v, a))
+        second[:, 7 * b : 7 * b + 3] = a[:, 6 * b : 6 * b + 3]
+        second[:, 7 * b + 3 : 7 * b + 7] = 0.5 * product(gain, turn) + 0.25 * product(spin, product(spin, turn))
+    return second
 
 
 def _poses(case: Case, times: Floats, q: Floats) -> Poses:

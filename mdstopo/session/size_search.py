@@ -457,7 +457,8 @@ class SizeSearch:
         self._made, self._refined = int(made), bool(refined)
         tried = map(tuple, np.asarray(arrays["tried"]).tolist())
         self._known = dict(zip(tried, np.asarray(arrays["values"]).tolist(), strict=True))
-        self._beginnings = list(map(tuple, np.asarray(arrays["beginnings"]).tolist())) or None
+        begun = np.asarray(arrays.get("beginnings", ())).tolist()  # older files have none
+        self._beginnings = list(map(tuple, begun)) or None
         self.progress = progress_in(arrays)
         self._counts[0] = self.progress.evaluations
 

@@ -163,6 +163,11 @@ def test_a_word_that_stands_below_a_section_is_told_with_that(
         assert f"`mdstopo schema {section}`" in told
 
 
+def test_a_word_of_cases_in_space_is_told_with_sections_of_these(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_group(["schema", "spherical", "--space"]) == 2
+    assert "`mdstopo schema joints --space`" in capsys.readouterr().err
+
+
 def test_keys_in_space_are_asked_for_with_a_section(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_group(["schema", "--space"]) == 2
     assert "--space goes with a SECTION" in capsys.readouterr().err

@@ -105,7 +105,7 @@ def test_progress_says_that_an_iterate_has_no_value() -> None:
 
 def test_progress_says_why_an_iterate_has_no_value() -> None:
     said = line(progress(objective=float("nan"), failure="the step became too small (belts[3])"))
-    assert "objective none (failed: the step became too small (belts[3])), best" in said
+    assert "objective none (failed): the step became too small (belts[3]), best" in said
 
 
 def test_a_condensed_history_has_both_ends_and_few_rows() -> None:

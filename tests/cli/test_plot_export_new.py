@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 from mdstopo.case.reader import load_case as read
+from mdstopo.case.reader import read_case
 from mdstopo.cli.check_scene import odd_scales
 from mdstopo.cli.group import run_group
 from mdstopo.cli.new import templates
@@ -21,6 +22,7 @@ from mdstopo.plots.scenery import edge_at, hull, sizes, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import styled
 from mdstopo.plots.thickness import FAINT, stored_peaks
+from mdstopo.report.gltf_motion import _cubics_suffice
 from mdstopo.report.report_content import content
 from mdstopo.scene.refusals import refusals
 from tests.front.support import CASE
@@ -258,6 +260,19 @@ def test_exported_places_are_those_of_the_motion_however_long_its_steps_are(tmp_
     found = Gltf(out.read_bytes())
     t, places = found.track(0, found.node("a"), "translation")
     assert places[:, 0] == pytest.approx(1.0 + 0.2 * np.cos(20.0 * t.astype(float)), abs=2e-4)
+
+
+def test_cubics_through_turns_in_space_are_taken_only_where_they_are_near():
+    """A body that swings about z by 0.2 cos 20 t."""
+    case = read_case(
+        "format: 1\ndimension: 3\ntime: {end: 1}\nbodies: {a: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 0]}}"
+    )
+    for step, near in ((0.1, False), (0.02, True)):
+        t = np.arange(0.0, 1.0, step)
+        angle, rate, gain = 0.2 * np.cos(20 * t), -4.0 * np.sin(20 * t), -80.0 * np.cos(20 * t)
+        q, v, a = np.zeros((len(t), 7)), np.zeros((len(t), 6)), np.zeros((len(t), 6))
+        q[:, 3], q[:, 6], v[:, 5], a[:, 5] = np.cos(angle / 2), np.sin(angle / 2), rate, gain
+        assert _cubics_suffice(case, (t, q, v, a), 1e-3) is near
 
 
 def test_finished_files_name_their_axes_and_units(results):

@@ -273,6 +273,7 @@ def test_a_gradient_that_is_not_finite_is_a_failed_evaluation(bad):
     state = run(Gsao(problem, settings(max_iterations=200)))
     best = np.sum(weights / optimum_of_compliance(weights, 6.0))
     assert state.history.accepted[1] is False
+    assert state.history.failure[:3] == ["", Status.NON_FINITE.value, ""]
     assert np.isfinite(state.gradients).all()
     assert state.best_objective == pytest.approx(best, rel=1e-4)
 

@@ -158,6 +158,9 @@ def test_a_search_that_is_stopped_among_the_last_neighbours_goes_on_to_the_same_
             whole.evaluations,
             whole.exchanged,
         )
+        older = search_of(problem, sizes)
+        older.restore({name: each for name, each in first.to_arrays().items() if name != "beginnings"})
+        assert older.run(never, nothing).finished
 
 
 def test_nothing_is_chosen_where_no_choice_keeps_the_rows():
