@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.special import ellipk
 
 import mdstopo
@@ -105,6 +106,40 @@ joints: [{name: pin, type: revolute, bodies: [bob, ground], at: {bob: [0, 0.01],
     x, y, angle = motion.q[0]
     arm = np.array([np.cos(angle) * -1.0 - np.sin(angle) * 0.01, np.sin(angle) * -1.0 + np.cos(angle) * 0.01])
     assert np.abs(np.array([x, y]) + arm).max() <= 1e-14
+
+
+CRANK = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 0.1}
+bodies:
+  crank: {mass: 1.3, inertia: 0.02, position: [1, 0.4]}
+  rod: {mass: 0.4, inertia: 0.005, position: [1.2, -0.7]}
+joints:
+  - {name: pin, type: revolute, bodies: [crank, ground], at: {crank: [0.7, 0.2], ground: [0, 0]}}
+  - {name: knee, type: revolute, bodies: [crank, rod], at: {crank: [1.2, 0.3], rod: [1.1, -0.5]}}
+"""
+
+
+def test_an_assembled_start_is_the_nearest_by_mass_where_bodies_turn_far():
+    """Parts that lie apart: a start that fits is left long before it is the nearest one."""
+    homes, pins, knees = np.array([[1, 0.4], [1.2, -0.7]]), np.array([0.7, 0.2]), np.array([[1.2, 0.3], [1.1, -0.5]])
+    root_mass, root_inertia = np.sqrt([1.3, 0.4]), np.sqrt([0.02, 0.005])
+
+    def start(angles):
+        first, second = (np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles)
+        crank = -first @ (pins - homes[0])
+        return np.array([crank, crank + first @ (knees[0] - homes[0]) - second @ (knees[1] - homes[1])])
+
+    def weighed(angles):
+        return np.concatenate([(root_mass[:, None] * (start(angles) - homes)).ravel(), root_inertia * angles])
+
+    best = least_squares(weighed, np.zeros(2), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    motion = simulate_text(CRANK, assemble="true")
+    q = motion.q[0].reshape(2, 3)
+    assert np.abs(best.x).min() > 0.3
+    assert q[:, 2] == pytest.approx(best.x, abs=1e-6)
+    assert q[:, :2] == pytest.approx(start(q[:, 2]), abs=1e-13)
 
 
 def test_a_motion_that_a_joint_does_not_allow_is_named_where_assembling_does_not_help():

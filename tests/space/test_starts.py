@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import yaml
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 import mdstopo
 from mdstopo.case.reader import read_case
@@ -98,3 +100,19 @@ def test_a_misfit_is_refused_and_put_onto_the_joints_on_request() -> None:
     assert np.abs(ends[0] - ends[1]).max() < 1e-13
     stated = np.array([[0, 0.1, 0.1], [0.4, 0.1, 0.22], [0.85, 0.02, 0.01]])
     assert 1e-3 < np.abs(x - stated).max() < 0.03  # no farther than the joints need
+
+
+def test_a_body_far_from_its_ball_turns_about_it_until_it_is_nearest() -> None:
+    """All moments alike, so it turns in the plane of the way to the ball and of its arm: m D r sin(b - a) = I a."""
+    mass, moment, arm, way = 1.3, 0.02, np.array([0.2, 0.1, 0.2]), np.array([-1.0, 0.4, 0.3])
+    turned = {"axis": [1, 2, 3], "angle": 1}
+    body = {"mass": mass, "inertia": [moment] * 3, "position": [0, 0, 0], "orientation": turned}
+    ball = {"type": "spherical", "bodies": ["body", "ground"], "at": {"body": arm.tolist(), "ground": way.tolist()}}
+    content = {"format": 1, "dimension": 3, "gravity": [0, 0, -9.81], "time": {"end": 0.1}, "bodies": {"body": body}}
+    content |= {"joints": [ball], "solver": {"assemble": True}}
+    motion = mdstopo.simulate(read_case(yaml.safe_dump(content, sort_keys=False)))
+    far, length = np.linalg.norm(way), np.linalg.norm(arm)
+    between = np.arccos(way @ arm / (far * length))
+    angle = brentq(lambda a: mass * far * length * np.sin(between - a) - moment * a, 0.0, between, xtol=1e-14)
+    turn = Rotation.from_rotvec(angle * np.cross(arm, way) / np.linalg.norm(np.cross(arm, way)))
+    assert motion.q[0, :3] == pytest.approx(way - turn.apply(arm), abs=1e-6)
