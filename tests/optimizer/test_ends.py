@@ -265,8 +265,8 @@ def test_where_limits_do_not_bend_one_design_far_off_is_all_that_is_tried_beside
     """A convex violation that is least inside the bounds: there is no lesser one."""
 
     def limits(x):
-        rows, slopes = np.array([x[0] + 2.0 * x[1], -x[0], -x[1]]), np.array([[1.0, 2.0], [-1.0, 0.0], [0.0, -1.0]])
-        return rows + [-1.0, 0.6, 0.6], slopes
+        slopes = np.array([[1.0, 2.0], [-1.0, 0.0], [0.0, -1.0]])
+        return slopes @ x + np.array([-1.0, 0.6, 0.6]), slopes
 
     problem = Toy(lambda x: (x[:1].copy(), np.array([[1.0, 0.0]])), [0.1, 0.9], 0.0, 1.0, constraints=limits)
     state = ended(problem)
