@@ -15,11 +15,13 @@ from mdstopo.optimizer.competing_rows import (
     RAISES,
     STEER,
     Around,
+    FeasibleSet,
     RowModel,
     Trial,
     lower_bound,
 )
 from mdstopo.optimizer.gsao_state import GsaoState
+from mdstopo.optimizer.nearest_feasible import project
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
 from mdstopo.optimizer.safeguards import is_least, nothing_is_left, residual_unit
 from mdstopo.optimizer.violations import merit, plain_violation, scaled_violation
@@ -63,12 +65,13 @@ BOUND, CARRIED = 1e3, 1e-6
 class BundleMethod:
     """Begin, judge and propose for one problem.
 
-    model: how subproblems are solved; settings: from `presets.settings`. Each method changes the state that it is
-    given; the driver copies it first.
+    model: how subproblems are solved; space: the designs that there are; settings: from `presets.settings`. Each method
+    changes the state that it is given; the driver copies it first.
     """
 
-    def __init__(self, model: RowModel, settings: Settings) -> None:
+    def __init__(self, model: RowModel, space: FeasibleSet, settings: Settings) -> None:
         self.model = model
+        self.space = space
         self.settings = settings
 
     def begin(self, state: GsaoState) -> None:
@@ -88,7 +91,9 @@ class BundleMethod:
             if kept or ((stuck or done) and state.violation <= tolerance):
                 self._return_to_objective(state)
                 return True
-            return stuck and not is_least(state, tolerance) and self._reset(state)
+            if not stuck or is_least(state, tolerance):
+                return False
+            return self._reset(state) or self._look_elsewhere(state)
         resists = len(state.penalty) > 0 and state.violation > tolerance
         if resists and (stuck or done or state.stagnation >= STAGNANT):
             self._restore(state)
@@ -118,6 +123,27 @@ class BundleMethod:
         state.restoring, state.resets = True, 0
         state.trust = max(state.trust, RESET_TRUST)
         self._begin(state)
+
+    def _look_elsewhere(self, state: GsaoState) -> bool:
+        """From a least violation propose a design far off, once a run, unless one before has kept the limits. Always
+        False: no step is to be proposed.
+
+        It lies half way to the farthest corner of the bounds: on none of them, and at least a quarter of the range away
+        in each variable.
+        """
+        space, x = self.space, state.alpha
+        known = state.looked_elsewhere or state.best_violation <= self.settings.tolerance
+        if known or state.iteration >= self.settings.max_iterations:
+            return False
+        state.looked_elsewhere = True
+        state.trial = project(0.5 * (x + self._farthest_corner(x)), space.lower, space.upper, space.linear)
+        state.predicted = float("inf")
+        return False
+
+    def _farthest_corner(self, x: Floats) -> Floats:
+        """The corner of the bounds that is farthest from a design x (N,)."""
+        space = self.space
+        return np.where(x - space.lower > space.upper - x, space.lower, space.upper)
 
     def _return_to_objective(self, state: GsaoState) -> None:
         """Go on with the objective, now that limits hold."""
@@ -150,6 +176,8 @@ class BundleMethod:
 
         Adapts the trust box, the curvature's steps, the concavity, and the counts of steps without decrease.
         """
+        if state.trial_is_elsewhere:
+            return self._judge_elsewhere(state, sample)
         settings = self.settings
         new = self._bundle(sample, state.restoring)
         groups = len(state.penalty) + 1
@@ -205,9 +233,13 @@ class BundleMethod:
         state.multipliers = trial.multipliers
         enough = CARRIED * np.concatenate([[1.0], state.penalty])
         state.bundle = state.bundle.aged(trial.multipliers, enough)
+        if state.restoring and state.violation > self.settings.tolerance and is_least(state, self.settings.tolerance):
+            self._look_elsewhere(state)
 
     def is_exhausted(self, state: GsaoState) -> bool:
         """Whether the last steps have changed next to nothing, or the model promises no decrease."""
+        if state.trial_is_elsewhere:
+            return False
         return state.small >= PATIENCE or not state.predicted > NO_DECREASE * abs(state.objective)
 
     def most_to_gain(self, state: GsaoState) -> float:
@@ -228,10 +260,31 @@ class BundleMethod:
         trial = around.flat(2.0 * added / len(state.alpha)).solve(rows, state.penalty)
         if not trial.solved:
             return float("inf")
-        least = lower_bound(rows, trial, state.alpha, self.model.space, state.penalty)
+        least = lower_bound(rows, trial, state.alpha, self.space, state.penalty)
         return max(merit(here[0], here[1:], state.penalty) - least, 0.0)
 
     # -- how
+
+    def _judge_elsewhere(self, state: GsaoState, sample: Sample) -> bool:
+        """Whether limits are to be restored from the evaluated trial, far from the least violation v at the iterate.
+
+        A function that bends downwards by at most b is convex once b r^2 is added, r being the way from the iterate; so
+        where it is stationary there, it is at least v - b r^2 everywhere. How far a row of one of the two designs lies
+        above the value at the other tells b, as far as that is known. Where b cannot bring v to 0 within the bounds,
+        as where the violation is convex, the iterate is the end.
+        """
+        d = state.trial - state.alpha
+        length, new = self.model.lengths(d)[1], self._bundle(sample, restoring=True)
+        here, there = state.bundle.subset(state.bundle.own), new.values().max()
+        least = float(here.values().max())
+        above = max(new.moved(-d, length).values().max() - least, here.moved(d, length).values().max() - there)
+        farthest = self.model.lengths(self._farthest_corner(state.alpha) - state.alpha)[1]
+        if there >= least and above * farthest**2 < least * length**2:
+            return False
+        state.take(sample, scaled_violation(sample))
+        state.trust = self.settings.number("trust_start")
+        self._restore(state)
+        return True
 
     def _is_confirmed(self, state: GsaoState) -> bool:
         """Whether rows that were found after others had been dropped leave nothing to be gained."""

@@ -78,8 +78,8 @@ class Gsao:
     def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
         """The bundle method for the problem's size; of very many variables only where rows compete from the start."""
         if len(self.lower) < WIDE:
-            return BundleMethod(DenseModel(space), self.settings)
-        return BundleMethod(WideModel(space, self._measures), self.settings) if self.competes else None
+            return BundleMethod(DenseModel(space), space, self.settings)
+        return BundleMethod(WideModel(space, self._measures), space, self.settings) if self.competes else None
 
     def start(self, initial: Floats | None = None) -> GsaoState:
         """Evaluate the (projected) initial design and propose a first step."""
@@ -174,6 +174,7 @@ class Gsao:
             steps=np.zeros((0, n)),
             changes=np.zeros((0, n)),
             restoring=False,
+            looked_elsewhere=False,
             resets=0,
             concavity=np.zeros(1),
             stagnation=0,

@@ -58,17 +58,18 @@ class GsaoState(State):
     each belongs to. What rejected trials have shown: `cuts` (K,), rows that were the highest there, linearised and seen
     from the iterate, and `cut_gradients` (K, N); `forgotten`, the objective at which they were last dropped.
 
-    Of the trial: `predicted`, the decrease of the merit function that the model promises. The adaptation: `shift` (N,)
-    distances of the shifts, `step` the last accepted step, in files its difference (N,), `trust` the half width of the
-    trust box in ranges, `convex` the relative weight of the quadratic term. Of each constraint: `penalty` (J,) on
-    violations in the subproblem, `merit_penalty` (J,) on them in the separable approximation's merit. `small` steps
-    and `failed` evaluations in a row; `largest_gradient`, the largest |dU/dalpha| of any iterate.
+    Of the trial: `predicted`, the decrease of the merit function that the model promises; infinite where the trial is
+    no step but a design far from a least violation. The adaptation: `shift` (N,) distances of the shifts, `step` the
+    last accepted step, in files its difference (N,), `trust` the half width of the trust box in ranges, `convex` the
+    relative weight of the quadratic term. Of each constraint: `penalty` (J,) on violations in the subproblem,
+    `merit_penalty` (J,) on them in the separable approximation's merit. `small` steps and `failed` evaluations in a
+    row; `largest_gradient`, the largest |dU/dalpha| of any iterate.
 
     Of the bundle method, where `uses_bundle` says that it makes the steps: `bundle` with the `multipliers` (K,) of its
     rows, `steps` and `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation
-    stands for the objective, `resets` how often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the
-    groups (`Bundle.lowered`), `stagnation` how many iterates the largest violation has not fallen well below
-    `violation_mark`.
+    stands for the objective, `looked_elsewhere` whether a design far from a least violation was tried, `resets` how
+    often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups (`Bundle.lowered`), `stagnation`
+    how many iterates the largest violation has not fallen well below `violation_mark`.
     """
 
     optimizer: ClassVar[str] = "gsao"
@@ -98,6 +99,7 @@ class GsaoState(State):
     steps: Slopes
     changes: Slopes
     restoring: bool
+    looked_elsewhere: bool
     resets: int
     concavity: Floats
     stagnation: int
@@ -126,6 +128,11 @@ class GsaoState(State):
         self.rows, self.gradients = sample.rows, sample.gradients
         self.constraint_rows, self.constraint_gradients = sample.constraint_rows, sample.constraint_gradients
         self.row_details = RowDetails.of(sample)
+
+    @property
+    def trial_is_elsewhere(self) -> bool:
+        """Whether the trial is no step but a design far from the iterate, a least violation."""
+        return self.predicted == np.inf
 
     @property
     def is_restoring(self) -> bool:
@@ -172,6 +179,8 @@ class GsaoState(State):
             return slopes_of(np.array(arrays[name]))
         if name == "shift":
             return Shifts(np.array(arrays[name]))
+        if name == "looked_elsewhere" and name not in arrays:  # of older files
+            return False
         if name == "step":
             array = np.array(arrays[name])
             return Step(array, np.zeros(array.shape))

@@ -183,7 +183,7 @@ def verdict(
             f"the slopes here and of designs tried beside it leave at most {to_gain / abs(state.objective):.2g} of the "
             f"objective to be gained, which is within the tolerance {settings.tolerance:.2g}"
         )
-    if state.restoring and (stuck or is_least(state, settings.tolerance)):
+    if state.restoring and not state.trial_is_elsewhere and (stuck or is_least(state, settings.tolerance)):
         return _without_limits(state, settings)
     if stuck:
         return RunStatus.STALLED, (
@@ -235,11 +235,17 @@ def is_least(state: GsaoState, tolerance: float) -> bool:
 
 def _without_limits(state: GsaoState, settings: Settings) -> tuple[RunStatus, str]:
     """The end of a run at an iterate that breaks limits by an amount that no step makes smaller."""
-    excess = f"{plain_violation(state.sample):.3g}"
+    last = plain_violation(state.sample)
+    excess = f"{last:.3g}"
     if state.best_violation <= settings.tolerance:
         return RunStatus.STALLED, (
             f"the best design keeps the limits; from a later one, whose largest violation is {excess} of its bound, "
             f"no step is found that makes it smaller (KKT residual {state.kkt:.2g})"
+        )
+    if state.looked_elsewhere and state.best_plain < last:
+        return RunStatus.FAILED, (
+            f"no design is found that keeps the limits: no step makes the largest violation, {state.best_plain:.3g} of "
+            "its bound, smaller, and a search that began far from there has come to a larger one"
         )
     if is_least(state, settings.tolerance):
         return RunStatus.FAILED, (

@@ -11,9 +11,10 @@ from mdstopo.optimizer.competing_rows import FeasibleSet, Trial, lower_bound, re
 from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import LinearRows, Sample
+from mdstopo.optimizer.state import State
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
-from tests.optimizer.toys import Toy
+from tests.optimizer.toys import Toy, failing
 
 
 def ended(problem, **options):
@@ -222,3 +223,93 @@ def test_a_run_that_ends_although_something_is_left_to_gain_has_not_converged() 
     state = ended(rounded(1e-6), overrides={"decrease_tolerance": 0.5, "trust_start": 1e-4, "trust_grow": 1.0})
     assert state.best_objective > 2e-3
     assert state.status is RunStatus.STALLED
+
+
+def two_wells(level=0.0):
+    """min x_0 where c = (x_0^2 - 1)^2 - 0.15 x_0 + 0.2 |x_1| + level is not positive: with level 0 only around x_0 = 1.
+
+    Around x_0 = -1 lies another least c, which is positive.
+    """
+
+    def limits(x):
+        well, slope = (x[0] ** 2 - 1.0) ** 2 - 0.15 * x[0] + level, 4.0 * x[0] * (x[0] ** 2 - 1.0) - 0.15
+        return well + 0.2 * x[1] * np.array([1.0, -1.0]), np.array([[slope, 0.2], [slope, -0.2]])
+
+    return Toy(lambda x: (x[:1].copy(), np.array([[1.0, 0.0]])), [-0.3, 0.5], -2.0, 2.0, constraints=limits)
+
+
+def least_of_wells():
+    """The least values of c, without its level, on the left and on the right."""
+    places = np.sort(np.roots([4.0, 0.0, -4.0, -0.15]).real)
+    left, right = ((x**2 - 1.0) ** 2 - 0.15 * x for x in (places[0], places[2]))
+    return left, right
+
+
+@pytest.mark.parametrize("first", [[-0.3, 0.5], [-0.5, -1.0], [-0.2, 0.1]])
+def test_a_least_violation_in_one_place_does_not_end_a_run_where_designs_elsewhere_keep_the_limits(first) -> None:
+    problem = two_wells()
+    problem.initial = np.array(first)
+    state = ended(problem)
+    assert state.looked_elsewhere
+    assert state.status is RunStatus.CONVERGED
+    edge = min(x.real for x in np.roots([1.0, 0.0, -2.0, -0.15, 1.0]) if abs(x.imag) < 1e-9)
+    assert np.allclose(state.best_alpha, [edge, 0.0], atol=1e-5)
+    assert len(problem.evaluated) <= 50
+
+
+@pytest.mark.parametrize("first", [-0.3, 0.3])
+def test_of_two_searches_that_find_no_design_within_the_limits_the_lesser_violation_is_told(first) -> None:
+    problem = two_wells(0.3)
+    problem.initial = np.array([first, 0.5])
+    state = ended(problem)
+    assert state.looked_elsewhere
+    assert state.status is RunStatus.FAILED
+    left, right = least_of_wells()
+    assert left > right > -0.3
+    assert np.isclose(state.best_plain, 0.3 + right, rtol=1e-6)
+    assert f"{0.3 + right:.3g} of its bound" in state.reason
+
+
+def test_a_second_search_whose_first_design_cannot_be_evaluated_leaves_the_least_violation_as_it_is() -> None:
+    problem = two_wells()
+    once = ended(problem)
+    begun = next(k for k, x in enumerate(problem.evaluated) if x[0] > 0.0)
+    state = ended(failing(two_wells(), {begun}))
+    assert once.status is RunStatus.CONVERGED
+    assert state.status is RunStatus.FAILED
+    assert state.evaluations == begun + 1
+    assert np.isclose(state.best_plain, least_of_wells()[0], rtol=1e-6)
+
+
+def test_a_run_that_is_stopped_before_a_second_search_goes_on_as_if_it_had_not_been() -> None:
+    problem = two_wells()
+    problem.competes = True
+    optimizer = Gsao(problem, settings())
+    state = stored = optimizer.start()
+    while state.running:
+        state = optimizer.step(state)
+        if state.trial_is_elsewhere:
+            stored = State.from_arrays(state.to_arrays())
+    assert stored.trial_is_elsewhere
+    # states of older files have not looked elsewhere
+    older = {name: each for name, each in optimizer.start().to_arrays().items() if name != "looked_elsewhere"}
+    assert not State.from_arrays(older).looked_elsewhere
+    resumed = run(optimizer, stored)
+    assert resumed.evaluations == state.evaluations
+    assert np.array_equal(resumed.alpha, state.alpha)
+
+
+def test_where_limits_do_not_bend_one_design_far_off_is_all_that_is_tried_beside_their_least_violation() -> None:
+    """A convex violation that is least inside the bounds: there is no lesser one."""
+
+    def limits(x):
+        slopes = np.array([[1.0, 2.0], [-1.0, 0.0], [0.0, -1.0]])
+        return slopes @ x + np.array([-1.0, 0.6, 0.6]), slopes
+
+    problem = Toy(lambda x: (x[:1].copy(), np.array([[1.0, 0.0]])), [0.1, 0.9], 0.0, 1.0, constraints=limits)
+    state = ended(problem)
+    assert state.status is RunStatus.FAILED
+    assert state.looked_elsewhere
+    assert not state.history.accepted[-1]
+    assert np.isclose(state.best_plain, 0.2)  # three rows with the multipliers 1/4, 1/4 and 1/2
+    assert len(problem.evaluated) <= 6
