@@ -23,7 +23,9 @@ KEPT, RESIDUAL = 1e-5, 10.0
 #: excess over the exact value, and of the least violation, that counts as reached
 REACHED, LEAST = 1e-3, 1e-2
 #: what a message says that calls a problem infeasible
-INFEASIBLE = re.compile(r"no design (was found that )?keeps|infeasible|least (violation|excess)", re.IGNORECASE)
+INFEASIBLE = re.compile(
+    r"no design (near this one |(is|was) found that )?keeps|infeasible|least (violation|excess)", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
