@@ -143,8 +143,8 @@ def _say_failures(output: Output, view: "ResultView") -> None:
         by_reason.setdefault(reason, []).append(k)
     for reason, failed in by_reason.items():
         more = f", ... ({len(failed)})" if len(failed) > _SHOWN else ""
-        which = f"iterate{'s' if len(failed) > 1 else ''} {', '.join(map(str, failed[:_SHOWN]))}{more}"
-        output.say(f"{which} failed: {reason}")
+        word = "iterates" if len(failed) > 1 else "iterate"
+        output.say(f"{word} {', '.join(map(str, failed[:_SHOWN]))}{more} failed: {reason}")
 
 
 def _failures(view: "ResultView") -> list[tuple[int, str]]:
