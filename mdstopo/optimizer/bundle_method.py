@@ -93,7 +93,10 @@ class BundleMethod:
                 return True
             if not stuck or is_least(state, tolerance):
                 return False
-            return self._reset(state) or self._look_elsewhere(state)
+            if self._reset(state):
+                return True
+            self._look_elsewhere(state)
+            return False
         resists = len(state.penalty) > 0 and state.violation > tolerance
         if resists and (stuck or done or state.stagnation >= STAGNANT):
             self._restore(state)
@@ -124,21 +127,19 @@ class BundleMethod:
         state.trust = max(state.trust, RESET_TRUST)
         self._begin(state)
 
-    def _look_elsewhere(self, state: GsaoState) -> bool:
-        """From a least violation propose a design far off, once a run, unless one before has kept the limits. Always
-        False: no step is to be proposed.
+    def _look_elsewhere(self, state: GsaoState) -> None:
+        """From a least violation propose a design far off, once a run, unless one before has kept the limits.
 
-        It lies half way to the farthest corner of the bounds: on none of them, and at least a quarter of the range away
-        in each variable.
+        It lies half way to the farthest corner of the bounds, or is the design nearest to that which volume rows allow;
+        where this is the iterate itself, nothing is proposed.
         """
         space, x = self.space, state.alpha
         known = state.looked_elsewhere or state.best_violation <= self.settings.tolerance
         if known or state.iteration >= self.settings.max_iterations:
-            return False
-        state.looked_elsewhere = True
-        state.trial = project(0.5 * (x + self._farthest_corner(x)), space.lower, space.upper, space.linear)
-        state.predicted = float("inf")
-        return False
+            return
+        trial = project(0.5 * (x + self._farthest_corner(x)), space.lower, space.upper, space.linear)
+        if self.model.lengths(trial - x)[0] > self.settings.number("change_tolerance"):
+            state.looked_elsewhere, state.trial, state.predicted = True, trial, float("inf")
 
     def _farthest_corner(self, x: Floats) -> Floats:
         """The corner of the bounds that is farthest from a design x (N,)."""
@@ -268,18 +269,18 @@ class BundleMethod:
     def _judge_elsewhere(self, state: GsaoState, sample: Sample) -> bool:
         """Whether limits are to be restored from the evaluated trial, far from the least violation v at the iterate.
 
-        A function that bends downwards by at most b is convex once b r^2 is added, r being the way from the iterate; so
+        A function that bends downwards by at most b is convex once b r^2 is added, r the distance from the iterate; so
         where it is stationary there, it is at least v - b r^2 everywhere. How far a row of one of the two designs lies
         above the value at the other tells b, as far as that is known. Where b cannot bring v to 0 within the bounds,
         as where the violation is convex, the iterate is the end.
         """
         d = state.trial - state.alpha
         length, new = self.model.lengths(d)[1], self._bundle(sample, restoring=True)
-        here, there = state.bundle.subset(state.bundle.own), new.values().max()
-        least = float(here.values().max())
-        above = max(new.moved(-d, length).values().max() - least, here.moved(d, length).values().max() - there)
+        own, value_there = state.bundle.subset(state.bundle.own), float(new.values().max())
+        least = float(own.values().max())
+        above = max(new.moved(-d, length).values().max() - least, own.moved(d, length).values().max() - value_there)
         farthest = self.model.lengths(self._farthest_corner(state.alpha) - state.alpha)[1]
-        if there >= least and above * farthest**2 < least * length**2:
+        if value_there >= least and above * farthest**2 < least * length**2:
             return False
         state.take(sample, scaled_violation(sample))
         state.trust = self.settings.number("trust_start")

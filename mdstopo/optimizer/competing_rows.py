@@ -260,7 +260,7 @@ def lower_bound(rows: Bundle, trial: Trial, x: Floats, space: FeasibleSet, penal
     total = np.bincount(rows.group, weights=y, minlength=len(penalty) + 1)
     if not total[0] > 0.0:
         return float("-inf")
-    share = np.minimum(1.0, penalty / np.maximum(total[1:], np.finfo(np.float64).tiny))
+    share = np.divide(penalty, total[1:], out=np.ones(len(penalty)), where=total[1:] > penalty)
     y *= np.concatenate([[1.0 / total[0]], share])[rows.group]
     value, gradient = rows.tangent(y, trial.x - x)
     if len(space.linear):

@@ -244,8 +244,8 @@ def _without_limits(state: GsaoState, settings: Settings) -> tuple[RunStatus, st
         )
     if state.looked_elsewhere and state.best_plain < last:
         return RunStatus.FAILED, (
-            f"no design is found that keeps the limits: no step makes the largest violation, {state.best_plain:.3g} of "
-            "its bound, smaller, and a search that began far from there has come to a larger one"
+            f"no design is found that keeps the limits: the least violation met is {state.best_plain:.3g} of its "
+            f"bound, and from the last design no step makes its own, {excess}, smaller"
         )
     if is_least(state, settings.tolerance):
         return RunStatus.FAILED, (

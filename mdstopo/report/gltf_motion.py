@@ -264,6 +264,7 @@ def _cubics_suffice(case: Case, states: tuple[Floats, Floats, Floats, Floats], a
     mean = np.diff(q, axis=0) / h
     first = (6.0 * mean - 4.0 * slope[:-1] - 2.0 * slope[1:]) / h  # the cubics' second derivatives at both ends
     last = (-6.0 * mean + 2.0 * slope[:-1] + 4.0 * slope[1:]) / h
+    # at the middle of a step; the largest difference is a tenth more at most
     apart = h**2 / 64.0 * (np.abs(bend[:-1] - first) + np.abs(bend[1:] - last))
     # an entry of a quaternion changes by half of the angle at most
     own = [allowed] * 2 + [CUBIC_ERROR] if case.dimension == 2 else [allowed] * 3 + [0.5 * CUBIC_ERROR] * 4
@@ -307,9 +308,9 @@ def _second_slopes(case: Case, q: Floats, v: Floats, a: Floats) -> Floats:
     none = np.zeros((len(q), 1))
     for b in range(len(case.bodies)):
         turn = q[:, 7 * b + 3 : 7 * b + 7]
-        spin, gain = (np.concatenate([none, each[:, 6 * b + 3 : 6 * b + 6]], axis=1) for each in (v, a))
+        spin, change = (np.concatenate([none, each[:, 6 * b + 3 : 6 * b + 6]], axis=1) for each in (v, a))
         second[:, 7 * b : 7 * b + 3] = a[:, 6 * b : 6 * b + 3]
-        second[:, 7 * b + 3 : 7 * b + 7] = 0.5 * product(gain, turn) + 0.25 * product(spin, product(spin, turn))
+        second[:, 7 * b + 3 : 7 * b + 7] = 0.5 * product(change, turn) + 0.25 * product(spin, product(spin, turn))
     return second
 
 

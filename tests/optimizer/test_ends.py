@@ -313,3 +313,30 @@ def test_where_limits_do_not_bend_one_design_far_off_is_all_that_is_tried_beside
     assert not state.history.accepted[-1]
     assert np.isclose(state.best_plain, 0.2)  # three rows with the multipliers 1/4, 1/4 and 1/2
     assert len(problem.evaluated) <= 6
+
+
+@pytest.mark.parametrize("equal", [False, True])
+def test_limits_that_are_too_tight_on_a_volume_row_that_leaves_no_other_design_end_as_failed(equal) -> None:
+    """The nearest design to one far off is the iterate itself: a uniform one on a row that counts all alike."""
+
+    def limits(x):
+        return np.array([0.8 - x.sum()]), -np.ones((1, len(x)))
+
+    for n in (1, 4):
+        problem = Toy(
+            lambda x: (x[:1].copy(), np.eye(len(x))[:1]), np.full(n, 0.4 / n), 0.0, 1.0, constraints=limits,
+            linear=LinearRows(np.ones((1, n)), np.array([0.4]), np.array([equal])),
+        )  # fmt: skip
+        state = ended(problem)
+        assert state.status is RunStatus.FAILED
+        assert "keeps the limits" in state.reason
+
+
+def test_a_bound_takes_a_constraint_that_carries_nothing_whatever_it_costs() -> None:
+    rows = Bundle(
+        np.array([[0.5, 0.0], [-0.2, 0.0]]), np.array([[1.0], [2.0]]), np.zeros((2, 0)), np.full(2, np.nan),
+        np.array([0, 1]), np.ones(2, bool), np.zeros(2, int), np.zeros(2),
+    )  # fmt: skip
+    space = FeasibleSet(np.zeros(1), np.ones(1), LinearRows.none(1), np.ones(1))
+    trial = Trial(np.zeros(1), np.array([1.0, 0.0]), np.zeros(0), np.zeros(2), 0.0, True)
+    assert lower_bound(rows, trial, np.array([0.3]), space, np.array([5.0])) == pytest.approx(0.2)

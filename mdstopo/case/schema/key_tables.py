@@ -48,9 +48,9 @@ def sections_with(word: str, case: Record = FORMAT) -> list[str]:
     as a law or a joint."""
     names = {word, word.removesuffix("s")}
     return [
-        section
+        section or "case"
         for section, part in places(case).items()
-        if section and any(names & {*each.path.split("."), *(key.name for key in each.record.keys)} for each in part)
+        if any(names & {*each.path.split("."), *(key.name for key in each.record.keys)} for each in part)
     ]
 
 
