@@ -15,7 +15,6 @@ from mdstopo.optimizer.competing_rows import (
     RAISES,
     STEER,
     Around,
-    FeasibleSet,
     RowModel,
     Trial,
     lower_bound,
@@ -65,13 +64,12 @@ BOUND, CARRIED = 1e3, 1e-6
 class BundleMethod:
     """Begin, judge and propose for one problem.
 
-    model: how subproblems are solved; space: the designs that there are; settings: from `presets.settings`. Each method
-    changes the state that it is given; the driver copies it first.
+    model: how subproblems are solved, and of which designs; settings: from `presets.settings`. Each method changes the
+    state that it is given; the driver copies it first.
     """
 
-    def __init__(self, model: RowModel, space: FeasibleSet, settings: Settings) -> None:
+    def __init__(self, model: RowModel, settings: Settings) -> None:
         self.model = model
-        self.space = space
         self.settings = settings
 
     def begin(self, state: GsaoState) -> None:
@@ -95,7 +93,7 @@ class BundleMethod:
                 return False
             if self._reset(state):
                 return True
-            self._look_elsewhere(state)
+            self._propose_far_design(state)
             return False
         resists = len(state.penalty) > 0 and state.violation > tolerance
         if resists and (stuck or done or state.stagnation >= STAGNANT):
@@ -127,23 +125,23 @@ class BundleMethod:
         state.trust = max(state.trust, RESET_TRUST)
         self._begin(state)
 
-    def _look_elsewhere(self, state: GsaoState) -> None:
+    def _propose_far_design(self, state: GsaoState) -> None:
         """From a least violation propose a design far off, once a run, unless one before has kept the limits.
 
         It lies half way to the farthest corner of the bounds, or is the design nearest to that which volume rows allow;
         where this is the iterate itself, nothing is proposed.
         """
-        space, x = self.space, state.alpha
-        known = state.looked_elsewhere or state.best_violation <= self.settings.tolerance
+        space, x = self.model.space, state.alpha
+        known = state.far_design_tried or state.best_violation <= self.settings.tolerance
         if known or state.iteration >= self.settings.max_iterations:
             return
         trial = project(0.5 * (x + self._farthest_corner(x)), space.lower, space.upper, space.linear)
         if self.model.lengths(trial - x)[0] > self.settings.number("change_tolerance"):
-            state.looked_elsewhere, state.trial, state.predicted = True, trial, float("inf")
+            state.far_design_tried, state.trial, state.predicted = True, trial, float("inf")
 
     def _farthest_corner(self, x: Floats) -> Floats:
         """The corner of the bounds that is farthest from a design x (N,)."""
-        space = self.space
+        space = self.model.space
         return np.where(x - space.lower > space.upper - x, space.lower, space.upper)
 
     def _return_to_objective(self, state: GsaoState) -> None:
@@ -177,8 +175,8 @@ class BundleMethod:
 
         Adapts the trust box, the curvature's steps, the concavity, and the counts of steps without decrease.
         """
-        if state.trial_is_elsewhere:
-            return self._judge_elsewhere(state, sample)
+        if state.trial_is_far_design:
+            return self._judge_far_design(state, sample)
         settings = self.settings
         new = self._bundle(sample, state.restoring)
         groups = len(state.penalty) + 1
@@ -235,11 +233,11 @@ class BundleMethod:
         enough = CARRIED * np.concatenate([[1.0], state.penalty])
         state.bundle = state.bundle.aged(trial.multipliers, enough)
         if state.restoring and state.violation > self.settings.tolerance and is_least(state, self.settings.tolerance):
-            self._look_elsewhere(state)
+            self._propose_far_design(state)
 
     def is_exhausted(self, state: GsaoState) -> bool:
         """Whether the last steps have changed next to nothing, or the model promises no decrease."""
-        if state.trial_is_elsewhere:
+        if state.trial_is_far_design:
             return False
         return state.small >= PATIENCE or not state.predicted > NO_DECREASE * abs(state.objective)
 
@@ -261,12 +259,12 @@ class BundleMethod:
         trial = around.flat(2.0 * added / len(state.alpha)).solve(rows, state.penalty)
         if not trial.solved:
             return float("inf")
-        least = lower_bound(rows, trial, state.alpha, self.space, state.penalty)
+        least = lower_bound(rows, trial, state.alpha, self.model.space, state.penalty)
         return max(merit(here[0], here[1:], state.penalty) - least, 0.0)
 
     # -- how
 
-    def _judge_elsewhere(self, state: GsaoState, sample: Sample) -> bool:
+    def _judge_far_design(self, state: GsaoState, sample: Sample) -> bool:
         """Whether limits are to be restored from the evaluated trial, far from the least violation v at the iterate.
 
         A function that bends downwards by at most b is convex once b r^2 is added, r the distance from the iterate; so

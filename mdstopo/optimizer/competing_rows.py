@@ -83,7 +83,12 @@ class Around(Protocol):
 
 
 class RowModel(Protocol):
-    """What a problem's size decides of the bundle method: how subproblems are solved and steps are measured."""
+    """What a problem's size decides of the bundle method: how subproblems are solved and steps are measured.
+
+    space: the designs that bounds and linear rows allow.
+    """
+
+    space: FeasibleSet
 
     def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
         """The subproblems at x (N,), in a box of so many ranges and so far; steps, changes: as of `State`."""

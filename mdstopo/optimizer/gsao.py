@@ -78,8 +78,8 @@ class Gsao:
     def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
         """The bundle method for the problem's size; of very many variables only where rows compete from the start."""
         if len(self.lower) < WIDE:
-            return BundleMethod(DenseModel(space), space, self.settings)
-        return BundleMethod(WideModel(space, self._measures), space, self.settings) if self.competes else None
+            return BundleMethod(DenseModel(space), self.settings)
+        return BundleMethod(WideModel(space, self._measures), self.settings) if self.competes else None
 
     def start(self, initial: Floats | None = None) -> GsaoState:
         """Evaluate the (projected) initial design and propose a first step."""
@@ -135,11 +135,14 @@ class Gsao:
     def terminate(self, state: State) -> tuple[RunStatus, str]:
         """Whether a state goes on, and if not why."""
         assert isinstance(state, GsaoState)
-        stuck = self._is_stuck(state)
-        to_gain = float("inf")
-        if stuck and state.uses_bundle and self.bundle is not None:
-            to_gain = self.bundle.most_to_gain(state)
-        return verdict(state, stuck, self.settings, self.objective_bound, to_gain)
+        return verdict(state, self._is_stuck(state), self.settings, self.objective_bound, self._most_to_gain)
+
+    def _most_to_gain(self, state: GsaoState) -> float:
+        """What the rows that are known leave to be gained, as `BundleMethod.most_to_gain` tells it; infinite where
+        another method makes the steps."""
+        if not state.uses_bundle or self.bundle is None:
+            return float("inf")
+        return self.bundle.most_to_gain(state)
 
     # The steps of the loop.
 
@@ -174,7 +177,7 @@ class Gsao:
             steps=np.zeros((0, n)),
             changes=np.zeros((0, n)),
             restoring=False,
-            looked_elsewhere=False,
+            far_design_tried=False,
             resets=0,
             concavity=np.zeros(1),
             stagnation=0,

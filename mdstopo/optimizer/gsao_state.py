@@ -67,7 +67,7 @@ class GsaoState(State):
 
     Of the bundle method, where `uses_bundle` says that it makes the steps: `bundle` with the `multipliers` (K,) of its
     rows, `steps` and `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation
-    stands for the objective, `looked_elsewhere` whether a design far from a least violation was tried, `resets` how
+    stands for the objective, `far_design_tried` whether a design far from a least violation was tried, `resets` how
     often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups (`Bundle.lowered`), `stagnation`
     how many iterates the largest violation has not fallen well below `violation_mark`.
     """
@@ -99,7 +99,7 @@ class GsaoState(State):
     steps: Slopes
     changes: Slopes
     restoring: bool
-    looked_elsewhere: bool
+    far_design_tried: bool
     resets: int
     concavity: Floats
     stagnation: int
@@ -130,7 +130,7 @@ class GsaoState(State):
         self.row_details = RowDetails.of(sample)
 
     @property
-    def trial_is_elsewhere(self) -> bool:
+    def trial_is_far_design(self) -> bool:
         """Whether the trial is no step but a design far from the iterate, a least violation."""
         return self.predicted == np.inf
 
@@ -179,7 +179,7 @@ class GsaoState(State):
             return slopes_of(np.array(arrays[name]))
         if name == "shift":
             return Shifts(np.array(arrays[name]))
-        if name == "looked_elsewhere" and name not in arrays:  # of older files
+        if name == "far_design_tried" and name not in arrays:  # of older files
             return False
         if name == "step":
             array = np.array(arrays[name])

@@ -158,12 +158,12 @@ def next_shift(shift: Floats, last: Step, step: Step, settings: Settings) -> Flo
 
 
 def verdict(
-    state: GsaoState, stuck: bool, settings: Settings, bound: float = -inf, to_gain: float = inf
+    state: GsaoState, stuck: bool, settings: Settings, bound: float, most_to_gain: Callable[[GsaoState], float]
 ) -> tuple[RunStatus, str]:
     """Whether to go on, and if not, why: a function of the state alone, so that a resumed run decides alike.
 
-    stuck: whether the next step would change next to nothing, or the last ones have. bound: no U is below it. to_gain:
-    what the rows that are known leave to be gained by any design, as `BundleMethod.most_to_gain` tells it.
+    stuck: whether the next step would change next to nothing, or the last ones have. bound: no U is below it.
+    most_to_gain: what the rows that are known leave to be gained by any design; asked where nothing else decides.
     """
     if state.status is RunStatus.FAILED:
         return state.status, state.reason
@@ -178,12 +178,13 @@ def verdict(
             f"the objective, {state.best_objective:.2g}, cannot be below {bound:g}, and what is left is within the "
             f"tolerance {settings.tolerance:.2g} of what the first design had to lose"
         )
-    if stuck and holds and nothing_is_left(state, to_gain, settings.tolerance):
+    to_gain = most_to_gain(state) if stuck and holds else inf
+    if nothing_is_left(state, to_gain, settings.tolerance):
         return RunStatus.CONVERGED, (
             f"the slopes here and of designs tried beside it leave at most {to_gain / abs(state.objective):.2g} of the "
             f"objective to be gained, which is within the tolerance {settings.tolerance:.2g}"
         )
-    if state.restoring and not state.trial_is_elsewhere and (stuck or is_least(state, settings.tolerance)):
+    if state.restoring and not state.trial_is_far_design and (stuck or is_least(state, settings.tolerance)):
         return _without_limits(state, settings)
     if stuck:
         return RunStatus.STALLED, (
@@ -242,7 +243,7 @@ def _without_limits(state: GsaoState, settings: Settings) -> tuple[RunStatus, st
             f"the best design keeps the limits; from a later one, whose largest violation is {excess} of its bound, "
             f"no step is found that makes it smaller (KKT residual {state.kkt:.2g})"
         )
-    if state.looked_elsewhere and state.best_plain < last:
+    if state.far_design_tried and state.best_plain < last:
         return RunStatus.FAILED, (
             f"no design is found that keeps the limits: the least violation met is {state.best_plain:.3g} of its "
             f"bound, and from the last design no step makes its own, {excess}, smaller"

@@ -250,7 +250,7 @@ def test_a_least_violation_in_one_place_does_not_end_a_run_where_designs_elsewhe
     problem = two_wells()
     problem.initial = np.array(first)
     state = ended(problem)
-    assert state.looked_elsewhere
+    assert state.far_design_tried
     assert state.status is RunStatus.CONVERGED
     edge = min(x.real for x in np.roots([1.0, 0.0, -2.0, -0.15, 1.0]) if abs(x.imag) < 1e-9)
     assert np.allclose(state.best_alpha, [edge, 0.0], atol=1e-5)
@@ -262,7 +262,7 @@ def test_of_two_searches_that_find_no_design_within_the_limits_the_lesser_violat
     problem = two_wells(0.3)
     problem.initial = np.array([first, 0.5])
     state = ended(problem)
-    assert state.looked_elsewhere
+    assert state.far_design_tried
     assert state.status is RunStatus.FAILED
     left, right = least_of_wells()
     assert left > right > -0.3
@@ -288,12 +288,12 @@ def test_a_run_that_is_stopped_before_a_second_search_goes_on_as_if_it_had_not_b
     state = stored = optimizer.start()
     while state.running:
         state = optimizer.step(state)
-        if state.trial_is_elsewhere:
+        if state.trial_is_far_design:
             stored = State.from_arrays(state.to_arrays())
-    assert stored.trial_is_elsewhere
-    # states of older files have not looked elsewhere
-    older = {name: each for name, each in optimizer.start().to_arrays().items() if name != "looked_elsewhere"}
-    assert not State.from_arrays(older).looked_elsewhere
+    assert stored.trial_is_far_design
+    # states of older files have tried no design far off
+    older = {name: each for name, each in optimizer.start().to_arrays().items() if name != "far_design_tried"}
+    assert not State.from_arrays(older).far_design_tried
     resumed = run(optimizer, stored)
     assert resumed.evaluations == state.evaluations
     assert np.array_equal(resumed.alpha, state.alpha)
@@ -309,7 +309,7 @@ def test_where_limits_do_not_bend_one_design_far_off_is_all_that_is_tried_beside
     problem = Toy(lambda x: (x[:1].copy(), np.array([[1.0, 0.0]])), [0.1, 0.9], 0.0, 1.0, constraints=limits)
     state = ended(problem)
     assert state.status is RunStatus.FAILED
-    assert state.looked_elsewhere
+    assert state.far_design_tried
     assert not state.history.accepted[-1]
     assert np.isclose(state.best_plain, 0.2)  # three rows with the multipliers 1/4, 1/4 and 1/2
     assert len(problem.evaluated) <= 6

@@ -31,17 +31,18 @@ DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
 def kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
     """Times inside (t[0], t[-1]) at which steps have to end because response j has a kink there; t (m + 1,): the steps'
     times. At an event steps end anyway."""
-    found = _kinks(driver, j, t)
-    return [time for time in found if not _is_at_event(driver, t, time)]
-
-
-def _is_at_event(driver: DriverWithRun, t: FloatArray, time: float) -> bool:
-    """Whether a time is that of an event, to rounding. An event's time varies with the design. A given time beside it,
-    at which a step ends, would take its place, and what is read there would seem not to move."""
     happened = np.diff(driver.index_of_steps()[: len(t), EVENTS]) > 0
+    return [time for time in _kinks(driver, j, t) if not _is_at_event(t, t[1:][happened], time)]
+
+
+def _is_at_event(t: FloatArray, events: FloatArray, time: float) -> bool:
+    """Whether a time is that of an event, to rounding. An event's time varies with the design. A given time beside it,
+    at which a step ends, would take its place, and what is read there would seem not to move.
+
+    t (m + 1,), events (E,): times of the steps, and those at which members switch.
+    """
     step = np.clip(np.searchsorted(t, time) - 1, 0, len(t) - 2)
-    apart = np.abs(t[1:][happened] - time)
-    return bool(np.any(apart <= DISTANCES[-1] * (t[step + 1] - t[step])))
+    return bool(np.any(np.abs(events - time) <= DISTANCES[-1] * (t[step + 1] - t[step])))
 
 
 def _kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
