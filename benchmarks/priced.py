@@ -325,7 +325,8 @@ def optima() -> Table:
         (
             "Relative changes of G in runs of all candidates: begun at the optimum with prices, and begun at the "
             "stated design. The latter were ended after so many iterations and had not converged; longer ones would "
-            "come lower.",
+            "come lower. A residual above the tolerance of 1e-6 is that of a run that ended where slopes leave less "
+            "than that to be gained, or where no step lowers G.",
         ),
     )
 
