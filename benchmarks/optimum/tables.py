@@ -103,7 +103,8 @@ def dynamic(chosen: Sequence[Problem], iterations: Sequence[int] = ITERATIONS) -
         for start in problem.starts():
             runs = [run(problem, start, count, best) for count in iterations]
             first = runs[0]
-            above = "limits broken" if not first.keeps else f"{_above(first.value, best):.2f}"
+            beside = "" if best is None else f"{_above(first.value, best):.2f}"
+            above = beside if first.keeps else "limits broken"
             words += sum(not each.untrue for each in runs)
             rows.append(
                 [
@@ -203,8 +204,8 @@ def word(run: Run) -> str:
     return run.status.replace("_", " ")
 
 
-def _above(value: float, best: float | None) -> float:
-    return float("nan") if best is None else 100.0 * (value - best) / abs(best)
+def _above(value: float, best: float) -> float:
+    return 100.0 * (value - best) / abs(best)
 
 
 def _number(value: float | None) -> str:

@@ -9,12 +9,13 @@ An answer {"failed"} says in a sentence what did not work. The folder has what `
 
 import json
 import os
-import resource
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
+
+from benchmarks.peak_memory import peak_memory
 
 #: fewest calls of a round, unless they have taken so many seconds
 CALLS, LONG = 3, 1.0
@@ -58,7 +59,7 @@ class Worker:
             wrong = None if own is None else float(np.max(np.abs(own - slopes)) / np.max(np.abs(slopes)))
             errors.append((float(abs(found - value) / abs(value)), wrong))
         self._calls.append(lambda design: objective(self._alpha[design], gradient))
-        return {"seconds": seconds, "errors": errors, "memory": _peak_memory()}
+        return {"seconds": seconds, "errors": errors, "memory": peak_memory() / 1024**2}
 
     def time(self, which: int, design: int, seconds: float) -> dict[str, Any]:
         """Call for so many seconds, and a few times unless that takes long; once at least."""
@@ -71,15 +72,6 @@ class Worker:
             times.append(time.perf_counter() - began)
         # once for all calls: asking for it takes as long as a part of the shortest
         return {"times": times, "processor": (time.process_time() - busy) / len(times)}
-
-
-def _peak_memory() -> float:
-    """MiB. What the system reports of a process of its own begins with the peak of the one that started it."""
-    status = Path("/proc/self/status")
-    if status.exists():
-        (line,) = (line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
-        return float(line.split()[1]) / 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024**2 if sys.platform == "darwin" else 1024)
 
 
 def serve(requests: TextIO, answers: TextIO) -> None:
