@@ -98,6 +98,8 @@ def test_all_units_of_dxf_are_known(number: int, metres: float) -> None:
 
 def test_tables_are_points_with_names_or_without() -> None:
     assert points_in(Path("rim.csv"), "x,y\n1,2\n3,4\n3,4\n")[0] == {"rim": [(1, 2), (3, 4)]}
+    assert points_in(Path("a.csv"), "nr,X [mm],y_mm\n1,5,6\n2,7,8\n")[0] == {"a": [(5, 6), (7, 8)]}
+    assert points_in(Path("a.csv"), "y;x;z;layer;weight\n1;2;3;a;9\n")[0] == {"a": [(2, 1, 3)]}
     assert points_in(Path("a.csv"), "a;1;2;3\nb;4;5;6\n")[0] == {"a": [(1, 2, 3)], "b": [(4, 5, 6)]}
     assert points_in(Path("a.txt"), "# made by hand\n1 2\n3  4\n")[0] == {"a": [(1, 2), (3, 4)]}
 
@@ -107,6 +109,8 @@ def test_tables_are_points_with_names_or_without() -> None:
     [
         ("a.csv", "1,2\n1,2,3,4\n", "line 2: found 1, 2, 3, 4"),
         ("a.csv", "x,y\n", "there are no points"),
+        ("a.csv", "x;y\n1,5;2\n", r"line 2: found 1,5, 2 \(the decimal sign is a point\)"),
+        ("a.csv", "x,y,nr\n1,,2\n", "line 2: found 1, 2, allowed are"),
         ("a.dxf", "hello\nworld\n", "this is no DXF"),
         ("a.svg", "<svg", "this is no SVG"),
         ("a.svg", '<svg><g id="k" transform="scale(2)"><line/></g></svg>', "'k' has a transform"),
