@@ -53,7 +53,7 @@ _compiled: OrderedDict[int, Evaluator] = OrderedDict()
 
 def _evaluator(case: Case) -> Evaluator:
     """The case's evaluator, made at its first use. Raises CaseError where the engine cannot compute the case."""
-    key = id(case)
+    key = id(_is_case(case))
     found = _compiled.get(key)
     if found is None:
         found = _compiled[key] = evaluator_of(case)
@@ -64,8 +64,18 @@ def _evaluator(case: Case) -> Evaluator:
     return found
 
 
+def _is_case(case: object) -> Case:
+    """What is to be a case, if it is one. Raises TypeError."""
+    if not isinstance(case, Case):
+        what = f"{type(case).__name__} {case!r:.60}" if isinstance(case, (str, Path)) else type(case).__name__
+        raise TypeError(f"found {what}, needed is a case, as mdstopo.load_case gives it")
+    return case
+
+
 def _design(case: Case, alpha: ArrayLike | None, variables: Mapping[str, ArrayLike] | None) -> FloatArray:
     """alpha (N,) with the values of variables (P,) behind it."""
+    if alpha is not None and np.iscomplexobj(alpha):
+        raise ValueError("alpha must be real, not complex; Evaluation.gradients has the exact derivatives")
     given = case.initial if alpha is None else np.asarray(alpha, dtype=np.float64)
     if not variables and not case.variables:
         return given
@@ -97,7 +107,7 @@ def simulate(
     A motion that cannot go on ends early, and says so in `Trajectory.status`.
     Raises CaseError where the case asks for what the engine cannot do, ValueError for an unusable alpha.
     """
-    names = [each.name for each in case.load_cases]
+    names = [each.name for each in _is_case(case).load_cases]
     if load_case is None:
         if len(names) > 1:
             raise ValueError(f"the case has several load cases, name one of them: {', '.join(names)}")
@@ -168,7 +178,7 @@ def optimize(
     from mdstopo.session.run_session import run_session
 
     return run_session(
-        case,
+        _is_case(case),
         path=path,
         resume=resume,
         overwrite=overwrite,

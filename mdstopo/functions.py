@@ -39,6 +39,10 @@ class Responses:
         self.lower, self.upper = np.concatenate([np.array([case.lower, case.upper]), *own], axis=1)
         self._last: tuple[FloatArray, FloatArray, FloatArray] | None = None
 
+    def __repr__(self) -> str:
+        of, names = self.case.title or self.case.name, ", ".join(self.names)
+        return f"<Responses of {of!r}: {names} by {len(self.x0):,} numbers>"
+
     def at(self, x: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """The values (m,) of objectives and constraints and their derivatives (m, n), at x (n,)."""
         asked = np.array(x, dtype=np.float64)

@@ -12,8 +12,13 @@ forward mode, do not exist.
 from collections.abc import Callable
 from typing import Any
 
-import jax
 import numpy as np
+
+try:
+    import jax
+except ModuleNotFoundError as error:
+    why = f"mdstopo.jax needs JAX ({error}): pip install 'mdstopo[jax]'"
+    raise ModuleNotFoundError(why, name=error.name) from error
 
 from mdstopo.case.model import Case
 from mdstopo.functions import Responses

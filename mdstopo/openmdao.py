@@ -11,7 +11,12 @@ OpenMDAO's AnalysisError, which its optimisers know how to take.
 from typing import Any
 
 import numpy as np
-import openmdao.api as om
+
+try:
+    import openmdao.api as om
+except ModuleNotFoundError as error:
+    why = f"mdstopo.openmdao needs OpenMDAO ({error}): pip install 'mdstopo[openmdao]'"
+    raise ModuleNotFoundError(why, name=error.name) from error
 
 from mdstopo.case.model import Case
 from mdstopo.functions import NoValueError, Responses

@@ -56,6 +56,10 @@ def load_case(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None 
     is no such file. overrides: key path -> value, as the command line's ``--set KEY=VALUE``; text is read as YAML.
     Raises CaseError with every mistake that one reading finds.
     """
+    stated: object = overrides
+    if stated is not None and not isinstance(stated, Mapping):
+        found = type(stated).__name__
+        raise TypeError(f"overrides: found {found}, needed is a mapping, such as {{'solver.tolerance': 1e-9}}")
     place = case_file(Path(path))
     try:
         text, digest = text_in(place)

@@ -3,6 +3,7 @@
 import time
 from typing import TYPE_CHECKING, Any
 
+from mdstopo.cli.output import duration
 from mdstopo.shown import counted
 
 if TYPE_CHECKING:
@@ -61,4 +62,4 @@ def in_words(found: dict[str, Any] | None) -> str:
     each = f"{counted(found['steps'], 'step')}, {counted(found['force_sums'], 'force sum')}"
     if found["points"] > 1:
         each = f"{found['points']} points of {each} or so"
-    return f"{each}, {found['milliseconds']:.3g} ms here"
+    return f"{each}, {duration(1e-3 * found['milliseconds'])} here"

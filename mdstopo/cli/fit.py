@@ -103,7 +103,7 @@ def command(
             remove_leftovers(place)
             run = _fitted(case, place, _Asked(points, resume, overwrite, line), output, interrupts.stop_requested)
     found = content(read_result(path))
-    written = path.with_name(f"{case.name}.fitted.yaml") if run.minimum is not None else None
+    written = _fitted_place(path) if run.minimum is not None else None
     if written is not None and picture_path is not None:
         _draw(path, picture_path)
     output.say(f"{case.title or case.name}: {run.status.replace('_', ' ')} - {run.reason}")
@@ -161,7 +161,7 @@ def _fitted(
     from mdstopo.store.checkpoint import Checkpointer
 
     before = _before(case, place, asked.resume, asked.overwrite, output.notice)
-    fitted_place = place.with_name(f"{case.name}.fitted.yaml")
+    fitted_place = _fitted_place(place)
     _check_fitted(fitted_place, place, case, asked.overwrite)
     announce_compilation(output, prepared(case))
     problem = FitProblem(case)
@@ -201,6 +201,11 @@ def _before(
         return admit_resume(place, case, notify, "fit")
     admit(place, case, "fit", overwrite, notify)
     return None
+
+
+def _fitted_place(place: Path) -> Path:
+    """Where the fitted case is, beside the result file: `pull.fitted.yaml` of `pull.fit.h5` or `pull.h5`."""
+    return place.with_name(f"{place.stem.removesuffix('.fit')}.fitted.yaml")
 
 
 def _check_fitted(fitted_place: Path, place: Path, case: "Case", overwrite: bool) -> None:

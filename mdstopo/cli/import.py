@@ -50,6 +50,8 @@ def command(source: Path, body: str, unit: str | None, fix: bool, out: Path | No
     else:
         content, told = _points(source, data, body, unit)
     text = text_of(content)
+    if source.suffix.lower() in _ROBOTS:
+        told += _refused(text)
     for sentence in told:
         output.notice(sentence)
     if out is None:
@@ -64,6 +66,18 @@ def command(source: Path, body: str, unit: str | None, fix: bool, out: Path | No
         raise StoreError(f"{out}: cannot be written: {error.strerror}") from error
     output.say(str(out))
     return 0
+
+
+def _refused(text: str) -> list[str]:
+    """Why the case that a robot becomes cannot be read, as sentences: its file may state what no body can have."""
+    from mdstopo.case.reader import read_case
+    from mdstopo.case.text.errors import CaseError
+
+    try:
+        read_case(text)
+    except CaseError as error:
+        return [f"warning: to be mended in the case: {each.path_key}: {each.message}" for each in error.mistakes]
+    return []
 
 
 def _points(source: Path, data: str, body: str, unit: str | None) -> tuple[dict[str, Any], list[str]]:

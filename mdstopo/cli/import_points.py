@@ -65,8 +65,13 @@ def _once(points: list[Point]) -> list[Point]:
 
 
 def _csv(data: str, path: Path) -> tuple[Layers, None]:
-    """Columns x, y or x, y, z, with a line of names or without; a column of text before or behind names the layer."""
+    """Columns x, y or x, y, z, with a line of names or without; a column of text before or behind names the layer.
+
+    Where the line of names has an x and a y, these are the columns; other numbers, as those that count rows, are no
+    coordinates.
+    """
     layers: Layers = {}
+    columns: list[int] = []
     sample = data[:4096]
     delimiter = next((each for each in (";", "\t", ",") if each in sample), " ")
     rows = csv.reader(io.StringIO(data), delimiter=delimiter, skipinitialspace=True)
@@ -74,16 +79,29 @@ def _csv(data: str, path: Path) -> tuple[Layers, None]:
         cells = [cell.strip() for cell in row if cell.strip()]
         if not cells or cells[0].startswith("#"):
             continue
-        numbers = [float(cell) for cell in cells if re.fullmatch(_NUMBER, cell)]
         words = [cell for cell in cells if not re.fullmatch(_NUMBER, cell)]
-        if not numbers and not layers:
+        if len(words) == len(cells) and not layers:
+            columns = _coordinates(row)
             continue  # names of columns
-        if len(numbers) not in (2, 3) or len(words) > 1:
-            raise ImportedError(
-                f"{path}, line {number}: found {', '.join(cells)}, allowed are x, y or x, y, z and a name"
-            )
+        chosen = [row[k].strip() for k in columns if k < len(row)] if columns else cells
+        numbers = [float(cell) for cell in chosen if re.fullmatch(_NUMBER, cell)]
+        if len(numbers) not in (2, 3) or len(words) > 1 or len(numbers) < len(columns):
+            comma = any(re.fullmatch(r"[-+]?\d+,\d+", word) for word in words)
+            hint = " (the decimal sign is a point)" if comma else ""
+            told = f"found {', '.join(cells)}{hint}, allowed are x, y or x, y, z and a name"
+            raise ImportedError(f"{path}, line {number}: {told}")
         layers.setdefault(words[0] if words else path.stem, []).append(tuple(numbers))
     return layers, None
+
+
+def _coordinates(names: list[str]) -> list[int]:
+    """The places of x, y and perhaps z among names of columns such as `x`, `x_mm` or `X [m]`; empty without x and y."""
+    found: dict[str, int] = {}
+    for place, name in enumerate(names):
+        letter = re.fullmatch(r"([xyz])(?:[ _\[(].*)?", name.strip().lower())
+        if letter is not None:
+            found.setdefault(letter[1], place)
+    return [found[axis] for axis in "xyz" if axis in found] if {"x", "y"} <= set(found) else []
 
 
 def _dxf(data: str, path: Path) -> tuple[Layers, float | None]:
@@ -147,7 +165,7 @@ def _svg(data: str, path: Path) -> tuple[Layers, float | None]:
         raise ImportedError(f"{path}: this is no SVG: {error}") from None
     layers: Layers = {}
     _svg_node(root, path.stem, layers, path)
-    return {name: [(x, -y) for x, y in points] for name, points in layers.items()}, _svg_unit(root)
+    return {name: [(x, 0.0 - y) for x, y in points] for name, points in layers.items()}, _svg_unit(root)
 
 
 def _svg_node(node: Xml.Element, name: str, layers: Layers, path: Path) -> None:

@@ -102,7 +102,11 @@ def robot_in(path: Path, data: str, fixed: bool = False) -> tuple[Plain, list[st
     if not tree.bodies:
         raise ImportedError(f"{path}: no body in it has a mass")
     for name, part in tree.bodies.items():
-        if part.mass <= 0.0 or np.linalg.eigvalsh(part.inertia).min() <= 0.0:
+        least = float(np.linalg.eigvalsh(part.inertia).min())
+        if part.mass < 0.0 or least < -1e-9 * np.abs(part.inertia).max():  # beyond rounding of turned parts
+            found = f"the mass {part.mass:g} kg and the least moment of inertia {least:g} kg m^2"
+            raise ImportedError(f"{path}: body {name!r}: found {found}; both have to be > 0")
+        if part.mass == 0.0 or least <= 0.0:
             raise ImportedError(f"{path}: body {name!r} has no mass or no inertia, and moves by a joint of its own")
     content: Plain = {
         "format": 1,

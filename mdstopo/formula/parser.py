@@ -271,6 +271,8 @@ def _unknown(word: str, names: Iterable[str]) -> str:
     hint = _did_you_mean(word, [*listed, *FUNCTIONS, *CONSTANTS])
     told = ", ".join(listed[:20]) + (", ..." if len(listed) > 20 else "")
     there = f"names are {told}" if listed else "no names are defined"
+    if word == TIME:
+        there += "; a formula of time has no leading ="
     return f"there is no name {_shown(word)}{hint or ';'} {there}"
 
 

@@ -59,6 +59,11 @@ class Trajectory:
     def _repr_html_(self) -> str:
         return html_of(self)
 
+    def __getstate__(self) -> dict[str, object]:
+        """What a copy has, also in another process: the states at the steps. What computes those between them is
+        compiled for this process."""
+        return {**self.__dict__, "steps": None, "border": None}
+
     @classmethod
     def of(
         cls,
@@ -92,11 +97,13 @@ class Trajectory:
     def at(self, times: ArrayLike) -> States:
         """States at times (T,), from the integrator's own dense output.
 
-        Raises ValueError where a time lies outside what was simulated.
+        Raises ValueError where a time lies outside what was simulated, and of a copy of a trajectory, as pickling
+        makes one, which has the states at its steps alone.
         """
+        if self.border is None:
+            raise ValueError("a copy of a trajectory has the states at its steps (t, q, v, a), none between them")
         asked = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if asked.ndim != 1 or not np.all((asked >= self.t[0]) & (asked <= self.t[-1])):
             raise ValueError(f"times must be one-dimensional and lie within {self.t[0]:g} .. {self.t[-1]:g} s")
-        assert self.border is not None
         (q, v, a), lam = self.steps.balanced(asked)
         return States(self.border.places(q), self.border.rates(q, v), self.border.rates(q, a), lam)

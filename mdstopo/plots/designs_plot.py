@@ -17,7 +17,8 @@ from mdstopo.plots.thickness import FAINT, Thickness, alike, thickness
 
 #: of the largest: a difference that is drawn
 LEAST = 0.05
-FIRST, SECOND = "#D55E00", "#0072B2"
+#: the colour of what there is more of: none that a group of members has
+MORE = "#1a1a1a"
 #: inches: how high a drawing is at most
 HIGHEST = 2.5
 
@@ -56,11 +57,11 @@ def draw_pair(module: Any, first: Source, second: Source, titles: tuple[str, str
     more, less = one.copy(), other.copy()
     more[pairs[:, 0]] -= other[pairs[:, 1]]
     less[pairs[:, 1]] -= one[pairs[:, 0]]
-    for axis, stage, own, rise, colour, title in (
-        (axes[1][0], stages[0], thick[0], more, FIRST, "more in the first"),
-        (axes[1][1], stages[1], thick[1], less, SECOND, "more in the second"),
+    for axis, stage, own, rise, title in (
+        (axes[1][0], stages[0], thick[0], more, "more in the first"),
+        (axes[1][1], stages[1], thick[1], less, "more in the second"),
     ):
-        _more(axis, stage, own, rise, (colour, inches))
+        _more(axis, stage, own, rise, inches)
         axis.set_title(title, loc="left")
     return figure
 
@@ -75,17 +76,16 @@ def _panels(module: Any, stages: list[Stage], rows: int) -> tuple[Any, list[list
     return figure, [[add_panel(figure, x, y, inches) for x, y in row] for row in places], inches
 
 
-def _more(axis: Any, stage: Stage, thick: Thickness, every: Floats, drawn_in: tuple[str, Floats]) -> None:
+def _more(axis: Any, stage: Stage, thick: Thickness, every: Floats, inches: Floats) -> None:
     """What members of a result have more of than those of another; all others are thin.
 
     axis: where they are drawn.
     stage: what draws the result.
     thick: how thick its members are.
     every (K,): how much more there is of each, as a share.
-    drawn_in: the colour, and the size of the drawing in inches (2,).
+    inches (2,): the size of the drawing.
     """
     case, q = stage.case, start_state(stage.case)
-    colour, inches = drawn_in
     blank = Thickness(tuple(np.zeros_like(share) for share in thick.shares), "")
     stage.draw(axis, q, blank, (None, None), inches, faint=0.5)
     more = np.split(every, np.cumsum([len(group) for group in case.members]))[:-1]
@@ -96,4 +96,4 @@ def _more(axis: Any, stage: Stage, thick: Thickness, every: Floats, drawn_in: tu
         is_more = rise[some] > LEAST
         add_lines(axis, lines[~is_more], side[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
         widths = NARROWEST + widest * rise[some][is_more]
-        add_lines(axis, lines[is_more], side[is_more], widest, colors=colour, linewidths=widths, zorder=2.4)
+        add_lines(axis, lines[is_more], side[is_more], widest, colors=MORE, linewidths=widths, zorder=2.4)

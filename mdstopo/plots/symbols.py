@@ -80,12 +80,26 @@ def _motions(case: Case, chosen: LoadCase) -> Iterator[Symbol]:
         for k, name in enumerate("xyz"[: case.dimension]):
             own = getattr(motion, name)
             if own is not None:
-                kind = "held" if _is_held(own, float(body.velocity[k])) else "motion"
-                yield Symbol(kind, motion.body, middle, way=np.eye(case.dimension)[k])
+                rate = float(body.velocity[k])
+                kind = "held" if _is_held(own, rate) else "motion"
+                way = np.eye(case.dimension)[k] * (_sense(own, rate, chosen) if kind == "motion" else 1.0)
+                yield Symbol(kind, motion.body, middle, way=way)
         if motion.angle is not None:
-            yield Symbol("unturned" if _is_held(motion.angle, _rate(body)) else "turning", motion.body, middle)
+            kind = "unturned" if _is_held(motion.angle, _rate(body)) else "turning"
+            size = _sense(motion.angle, _rate(body), chosen) if kind == "turning" else 1.0
+            yield Symbol(kind, motion.body, middle, size=size)
         if motion.rotation is not None:
             yield Symbol("unturned" if _stands(motion.rotation) else "turning", motion.body, middle)
+
+
+def _sense(own: Prescribed, rate: float, chosen: LoadCase) -> float:
+    """1 or -1, the way in which a coordinate is driven: the sign of the acceleration or velocity where it is largest,
+    of the position where it is farthest from its first, or of the rate at the start where there is no acceleration."""
+    signal, span = own.signal, (chosen.start, chosen.end)
+    first = _value(signal, chosen.start) if own.kind == "position" else 0.0
+    values = np.array([_value(signal, t) for t in _times((signal,), span)]) - first
+    largest = float(values[np.abs(values).argmax()])
+    return float(np.copysign(1.0, largest or rate))
 
 
 def _rate(body: Any) -> float:
@@ -140,11 +154,16 @@ def _shown(signals: tuple[Any, ...], time: float | None, span: tuple[float, floa
     """The vector at a time; without one, where its norm is largest between two times."""
     if time is not None:
         return np.array([_value(each, time) for each in signals])
+    values = np.array([[_value(each, t) for each in signals] for t in _times(signals, span)])
+    return np.asarray(values[int(np.linalg.norm(values, axis=1).argmax())])
+
+
+def _times(signals: tuple[Any, ...], span: tuple[float, float]) -> list[float]:
+    """Times among which signals are searched for their largest values: of rows, and of formulas evenly in a span."""
     times = np.unique(np.concatenate([[0.0], *(each.times for each in signals if isinstance(each, Table))]))
     if any(isinstance(each, TimeFormula) for each in signals):
         times = np.union1d(times, np.linspace(*span, SAMPLES))
-    values = np.array([[_value(each, t) for each in signals] for t in times.tolist()])
-    return np.asarray(values[int(np.linalg.norm(values, axis=1).argmax())])
+    return [float(t) for t in times]
 
 
 def _value(signal: Any, time: float) -> float:

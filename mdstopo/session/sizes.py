@@ -1,5 +1,6 @@
 """The last stage of a run whose case has a catalogue: the sizes of the members that are kept (`size_search`)."""
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -31,6 +32,8 @@ Floats = NDArray[np.float64]
 CATALOGUE, SEARCH = "catalogue", "catalogue/search"
 #: members with less than this share of the least size above 0 are not kept
 KEPT = 0.5
+#: seconds between two lines on how far the choice is
+SAID_EVERY = 10.0
 
 
 class Sizes:
@@ -107,9 +110,17 @@ class Sizes:
         of = count_text(sum(len(group) for group in self.case.design_groups if group.sizes))
         notify(f"choosing sizes of {self._kept} members of {of}, {count_text(catalogued.choices)} choices")
 
+        said_at = time.monotonic()
+
         def save(progress: SearchProgress) -> None:
+            nonlocal said_at
             self.outcome = self._outcome(progress, catalogued)
             keep()
+            if time.monotonic() - said_at >= SAID_EVERY:
+                said_at = time.monotonic()
+                objective = f"{self._sign * progress.objective:.6g}"
+                best = "no choice yet" if progress.x is None else f"best choice {objective}"
+                notify(f"choosing sizes: {progress.nodes:,} nodes, {progress.evaluations:,} evaluations, {best}")
 
         progress = search.run(stop, save)
         self.outcome = self._outcome(progress, catalogued)

@@ -52,9 +52,10 @@ def tables(view: ResultView, case: Case) -> dict[str, Table]:
 def _members(view: ResultView, case: Case) -> Table:
     p, q, design = (view.array(f"members/{name}") for name in ("p", "q", "design"))
     ends = [f"{end}_{axis}_m" for end in ("from", "to") for axis in point_columns(case)]
-    header = ["member", "group", *ends, "design"]
+    header = ["member", "group", *ends, "length_m", "design"]
     columns: list[Any] = [
-        range(len(p)), view.lines("members/group"), *p.T.tolist(), *q.T.tolist(), design.astype(int).tolist(),
+        range(len(p)), view.lines("members/group"), *p.T.tolist(), *q.T.tolist(),
+        np.linalg.norm(np.subtract(q, p), axis=1).tolist(), design.astype(int).tolist(),
     ]  # fmt: skip
     places = np.flatnonzero(design)
     extra: dict[str, Any] = {}

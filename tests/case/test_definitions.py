@@ -72,6 +72,8 @@ def test_in_space_too() -> None:
         ("k: k", "225", "define.k", "is defined by itself: k -> k"),
         ("k: lenght + 1, length: 2", "225", "define.k", "did you mean 'length'?"),
         ("k: 1 / (j - 2), j: 2", "225", "define.k", "1 / (j - 2) divides by zero (with 1, 0) (column 3"),
+        ("k: 3 mm", "225", "define.k", "defined numbers are in SI units, without them: write 0.003"),
+        ("k: 3", '"=k * t"', "members.belts.law.stiffness", "names are k; a formula of time has no leading ="),
         ("k: true", "225", "define.k", "found true, allowed is a number or an expression"),
         ("k: [1]", "225", "define.k", "found a list of 1"),
         ("k: .nan", '"=k"', "define.k", "found .nan, allowed is a number or an expression that is finite"),

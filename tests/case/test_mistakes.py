@@ -306,3 +306,8 @@ def test_very_many_mistakes_are_cut_short_in_good_time() -> None:
     assert time.perf_counter() - start < 10.0
     assert len(found) == 1001
     assert "more mistakes" in found[-1].message
+
+
+def test_a_decimal_comma_between_braces_is_told_as_one() -> None:
+    found = mistakes(SMALL.replace("{mass: 2,", "{mass: 2,5,"))
+    assert [each.message[:47] for each in found] == ["unknown key '5' (the decimal sign is a point), "]

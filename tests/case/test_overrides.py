@@ -46,6 +46,24 @@ def test_values_may_be_python_objects() -> None:
     assert read_case(SMALL, overrides=case.overrides) == case  # the text kept is as good as the value
 
 
+def test_a_number_with_a_unit_needs_no_quotation_marks_that_a_shell_takes_away() -> None:
+    units = {"bodies.a.mass": "7000 g", "bodies.a.position": "[20 cm, 1]", "time": "{end: 300 ms}", "title": "3 kg"}
+    case = read_case(SMALL, overrides=units)
+    assert (case.bodies[0].mass, case.bodies[0].position, case.load_cases[0].end) == (7.0, (0.2, 1.0), 0.3)
+    assert case.title == "3 kg"
+    assert read_case(SMALL, overrides=case.overrides) == case
+
+
+@pytest.mark.parametrize("value", ["null", None])
+def test_null_removes_a_key_as_in_a_case_that_extends_another(value: str | None) -> None:
+    without = read_case(SMALL, overrides={"constraints": value, "members.belts.max_length": value})
+    assert read_case(SMALL).constraints
+    assert without.constraints == ()
+    assert read_case(SMALL, overrides=without.overrides) == without
+    found = mistakes(SMALL, {"bodies.a.mass": value})
+    assert [m.message for m in found] == ["the key 'mass' is missing (mass, in kg)"]
+
+
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [

@@ -15,23 +15,28 @@ CASE = """
 format: 1
 gravity: [0, {gravity}]
 time: {{end: {end}}}
-bodies: {{b: {{mass: {mass}, inertia: {inertia}, position: [{x}, 0], angle: {angle}}}}}
+bodies:
+  b: {{mass: {mass}, inertia: {inertia}, position: [{x}, 0], angle: {angle}}}
+  a: {{mass: 1, inertia: 1, position: [9, 9], angular_velocity: {rate}}}
 points:
   p: {{body: b, grid: {{list: [[{x}, {y}], [0, 1]]}}}}
   g: {{body: ground, grid: {{list: [[0, 2], [1, 2]]}}}}
 members: {{m: {{from: g, to: p, law: {{type: spring, stiffness: {stiffness}, free_length: {free}}}}}}}
 bushings: [{{bodies: [ground, b], at: [0, 0], stiffness: [{stiffness}, 0, {turning}]}}]
-loads: [{{body: b, force: [{{table: [[0, 0], [{half}, {force}]]}}, 0]}}]
+loads:
+  - {{body: b, force: [{{table: [[0, 0], [{half}, {force}]]}}, {{formula: sin(w*t), parameters: {{w: {factor}}}}}]}}
 objectives: {{G: {{response: energy}}}}
 """
 SI = {
     "gravity": "-9.80665", "end": "0.5", "mass": "12.5", "inertia": "2", "x": "0.04", "y": "0.3048", "angle": "0.25",
-    "stiffness": "2500", "free": "0.035", "turning": "7", "half": "0.25", "force": "4448.2216152605",
+    "stiffness": "2500", "free": "0.035", "turning": "7", "half": "0.25", "force": "4448.2216152605", "rate": "2",
+    "factor": "3",
 }  # fmt: skip
 UNITS = {
     "gravity": '"-9.80665 m/s^2"', "end": '"500 ms"', "mass": '"12500 g"', "inertia": '"2 kg m²"', "x": '"40 mm"',
     "y": '"1 ft"', "angle": '"250 mrad"', "stiffness": '"2.5 N/mm"', "free": '"3.5 cm"', "turning": '"7 N m/rad"',
-    "half": '"0.25 s"', "force": '"1000 lbf"',
+    "half": '"0.25 s"', "force": '"1000 lbf"', "rate": '"2 1/s"',
+    "factor": "3",
 }  # fmt: skip
 
 
@@ -75,6 +80,8 @@ def test_units_have_their_international_factors(text: str, needed: str, value: f
         ("turning", '"7 N/m"', "bushings[0].stiffness[2]", ["in N m/rad"]),
         ("end", '"4 m/"', "time.end", ["no unit"]),
         ("end", '"0.5"', "time.end", ["a quoted number is text"]),
+        ("rate", '"20 Hz"', "bodies.a.angular_velocity", ["in rad/s", "rev/s or rpm, not in Hz"]),
+        ("factor", '"20 Hz"', "loads[0].force[1].parameters.w", ["units are read where a key has one of its own"]),
     ],
 )
 def test_a_wrong_unit_is_a_mistake_with_its_place(key: str, value: str, path: str, words: list[str]) -> None:

@@ -230,7 +230,8 @@ def test_an_orientation_that_is_none_is_refused(orientation: str, message: str) 
         (
             "force: [1, 0, 0]",
             "moment: 3",
-            "loads[0].moment: found 3, allowed is [mx, my, mz] or {table: rows [t, mx, my, mz]}",
+            "loads[0].moment: found 3, allowed is [mx, my, mz], {formula: expressions of t} or "
+            "{table: rows [t, mx, my, mz]}",
         ),
         (
             "gravity: [0, 0, -9.8]",

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.cli.check_cost import in_words as cost_in_words
 from mdstopo.cli.check_scene import in_words, long_step, odd_scales, restraint, unrestrained
 from mdstopo.cli.front_display import line
 from mdstopo.cli.group import run_group
@@ -209,3 +210,9 @@ def test_what_a_front_may_still_need_is_told_apart_from_what_it_is_doing() -> No
     assert run.expected == pytest.approx(6.4)
     assert [each.left for each in told] == [4.0, 0.0]
     assert [each.more for each in told] == pytest.approx([1.4 * 4.0, 2.4 * 4.0])
+
+
+@pytest.mark.parametrize(("milliseconds", "told"), [(12.6, "12.6 ms here"), (4870.0, "4.87 s here")])
+def test_the_time_of_an_evaluation_is_told_in_a_unit_that_fits(milliseconds: float, told: str) -> None:
+    found = {"steps": 25, "force_sums": 16_229, "milliseconds": milliseconds, "points": 1}
+    assert cost_in_words(found) == f"25 steps, 16,229 force sums, {told}"

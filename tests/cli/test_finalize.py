@@ -330,7 +330,7 @@ def test_a_threshold_keeps_what_reaches_it_and_the_table_says_all(capsys: pytest
         (["--keep", "3", "--set", "points.edge.grid.rectangle.count=5"], "the design has 21 values"),
         (["--keep", "3", "--set", UNCERTAIN], "a case with uncertainty cannot be finalized"),
         (["--keep", "3", "--set", "design.mirrored=[[belts, belts]]"], "belts"),
-        (["--keep", "3", "--set", "objectives=null"], "objectives"),
+        (["--keep", "3", "--set", "objectives=null"], "no objective is called 'G2'"),
     ],
 )
 def test_bad_use_is_refused_before_work(

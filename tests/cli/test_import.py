@@ -98,6 +98,8 @@ def test_all_units_of_dxf_are_known(number: int, metres: float) -> None:
 
 def test_tables_are_points_with_names_or_without() -> None:
     assert points_in(Path("rim.csv"), "x,y\n1,2\n3,4\n3,4\n")[0] == {"rim": [(1, 2), (3, 4)]}
+    assert points_in(Path("a.csv"), "nr,X [mm],y_mm\n1,5,6\n2,7,8\n")[0] == {"a": [(5, 6), (7, 8)]}
+    assert points_in(Path("a.csv"), "y;x;z;layer;weight\n1;2;3;a;9\n")[0] == {"a": [(2, 1, 3)]}
     assert points_in(Path("a.csv"), "a;1;2;3\nb;4;5;6\n")[0] == {"a": [(1, 2, 3)], "b": [(4, 5, 6)]}
     assert points_in(Path("a.txt"), "# made by hand\n1 2\n3  4\n")[0] == {"a": [(1, 2), (3, 4)]}
 
@@ -107,6 +109,8 @@ def test_tables_are_points_with_names_or_without() -> None:
     [
         ("a.csv", "1,2\n1,2,3,4\n", "line 2: found 1, 2, 3, 4"),
         ("a.csv", "x,y\n", "there are no points"),
+        ("a.csv", "x;y\n1,5;2\n", r"line 2: found 1,5, 2 \(the decimal sign is a point\)"),
+        ("a.csv", "x,y,nr\n1,,2\n", "line 2: found 1, 2, allowed are"),
         ("a.dxf", "hello\nworld\n", "this is no DXF"),
         ("a.svg", "<svg", "this is no SVG"),
         ("a.svg", '<svg><g id="k" transform="scale(2)"><line/></g></svg>', "'k' has a transform"),
@@ -219,6 +223,7 @@ def test_the_first_body_is_held_on_request() -> None:
         (ARM.replace('type="prismatic"', 'type="screw"'), "'screw', which no case has"),
         (ARM.replace('<parent link="base"/>', '<parent link="bass"/>'), "'bass' is no link"),
         (ARM.replace('<mass value="3"/>', '<mass value="0"/>'), "'lower' has no mass"),
+        (ARM.replace('<mass value="3"/>', '<mass value="-3"/>'), "'lower': found the mass -3 kg .*; both have"),
         (MJCF.replace("<freejoint/>", '<joint/><joint type="slide"/>'), "has 2 joints"),
         (MJCF.replace('type="capsule"', 'type="mesh"'), "state an <inertial>"),
         (MJCF.replace("<freejoint/>", '<freejoint/><frame pos="0 0 1"/>'), "<frame> in 'ball' is not read"),
@@ -275,3 +280,16 @@ def test_masses_are_those_of_mujoco() -> None:
         at = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body.name)
         assert model.body_mass[at] == pytest.approx(body.mass, rel=1e-12)
         assert sorted(model.body_inertia[at]) == pytest.approx(np.linalg.eigvalsh(body.inertia).tolist(), rel=1e-9)
+
+
+def test_what_of_a_robot_no_case_can_have_is_told_when_it_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.urdf").write_text(ARM.replace('iyy="1" izz="1"', 'iyy="1" izz="5"'), encoding="utf-8")
+    assert run_group(["import", "arm.urdf", "--out", "arm.yaml"]) == 0
+    told = capsys.readouterr().err
+    assert "warning: to be mended in the case: bodies.lower.inertia: found the principal moments 1, 1, 5" in told
+    Path("right.urdf").write_text(ARM, encoding="utf-8")
+    assert run_group(["import", "right.urdf", "--out", "right.yaml"]) == 0
+    assert "to be mended" not in capsys.readouterr().err

@@ -1,5 +1,7 @@
 """The Python interface: shapes, mappings, what is refused."""
 
+import copy
+import pickle
 import subprocess
 import sys
 
@@ -163,3 +165,36 @@ def test_names_of_the_package_are_the_apis():
     assert mdstopo.evaluate is mdstopo.api.evaluate
     with pytest.raises(AttributeError):
         mdstopo.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize("call", [simulate, evaluate, mdstopo.optimize])
+def test_a_path_in_the_place_of_a_case_is_refused_with_what_makes_one(call):
+    with pytest.raises(
+        TypeError, match=r"found str 'cases/fig6.yaml', needed is a case, as mdstopo\.load_case gives it"
+    ):
+        call("cases/fig6.yaml")
+    with pytest.raises(TypeError, match="found NoneType, needed is a case"):
+        call(None)
+
+
+def test_overrides_that_are_no_mapping_are_refused_in_words():
+    with pytest.raises(TypeError, match="overrides: found list, needed is a mapping"):
+        load_case(CASES / "fig6.yaml", ["solver.tolerance=1e-6"])
+
+
+def test_a_complex_design_is_refused_as_its_imaginary_part_would_be_lost():
+    case = paper("fig6")
+    with pytest.raises(ValueError, match="alpha must be real, not complex"):
+        evaluate(case, np.full(case.n_design, 0.1 + 1e-20j))
+
+
+@pytest.mark.parametrize("copied", [lambda it: pickle.loads(pickle.dumps(it)), copy.deepcopy])
+def test_a_copy_of_a_trajectory_has_its_states_and_says_what_it_has_not(copied):
+    motion = simulate(paper("fig6"))
+    other = copied(motion)
+    for name in ("t", "q", "v", "a", "lam"):
+        assert np.array_equal(getattr(other, name), getattr(motion, name))
+    assert repr(other) == repr(motion)
+    with pytest.raises(ValueError, match="states at its steps"):
+        other.at(motion.t[-1])
+    assert motion.at(motion.t[-1]).q.shape == (1, motion.q.shape[1])

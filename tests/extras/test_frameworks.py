@@ -1,5 +1,8 @@
 """Cases inside SciPy, JAX, PyTorch and OpenMDAO: values and gradients are those of `evaluate`; optimisers use them."""
 
+import importlib
+import sys
+
 import numpy as np
 import pytest
 
@@ -149,3 +152,15 @@ def test_openmdao_has_variables_of_laws_as_inputs():
     slope = problem.compute_totals(of=["G"], wrt=["k"])["G", "k"]
     direct = mdstopo.evaluate(case)
     assert slope[0, 0] == pytest.approx(direct.variable_gradients["G"]["k"][0], rel=1e-12)
+
+
+@pytest.mark.parametrize(("name", "needs"), [("jax", "jax"), ("torch", "torch"), ("openmdao", "openmdao.api")])
+def test_a_framework_that_is_not_installed_is_named_with_what_installs_it(monkeypatch, name, needs):
+    monkeypatch.setitem(sys.modules, needs, None)
+    monkeypatch.delitem(sys.modules, f"mdstopo.{name}", raising=False)
+    with pytest.raises(ModuleNotFoundError, match=rf"pip install 'mdstopo\[{name}\]'"):
+        importlib.import_module(f"mdstopo.{name}")
+
+
+def test_responses_say_what_they_are(case):
+    assert repr(Responses(case)).endswith(f"G, constraints[0] by {len(case.start)} numbers>")

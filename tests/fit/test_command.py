@@ -94,6 +94,7 @@ def test_json_is_one_object(folder: Path, capsys: pytest.CaptureFixture[str]) ->
     said = json.loads(capsys.readouterr().out)
     assert said["command"] == "fit"
     assert said["path"] == "there/own.h5"
+    assert said["fitted_case"] == "there/own.fitted.yaml"  # another fit of the case has another one
     assert [each["name"] for each in said["estimates"]] == ["gravity[1]", "bodies.stone.velocity[1]"]
 
 

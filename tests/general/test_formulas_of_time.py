@@ -311,6 +311,8 @@ MALFORMED = {
     "force: {formula: ['t', 'b'], parameters: {a: 1}}": ("loads[0].force.formula[1]", "there is no name 'b'"),
     "force: {formula: ['t', 'a'], parameters: {t: 1}}": ("loads[0].force.parameters.t", "the name 't' is taken"),
     "moment: 'x + 1'": ("loads[0].moment", "allowed is a number, an expression of t, or {table"),
+    "force: ['a * t', 0]": ("loads[0].force[0]", "numbers of its own have names in {formula: ..., parameters: {...}}"),
+    "force: 3": ("loads[0].force", "allowed is [fx, fy], {formula: expressions of t} or {table"),
     "moment: '3 mm'": ("loads[0].moment", "in a unit that measures the same"),
 }
 

@@ -103,3 +103,23 @@ def test_the_legend_shows_a_symbol_as_it_is_where_the_view_has_it_end_on() -> No
     (handle,), (label,) = axis.get_legend_handles_labels()
     assert label == "held coordinate"
     assert np.array_equal(handle.get_marker().vertices, _all_of(glyphs()["held"]).vertices)
+
+
+@pytest.mark.parametrize(
+    ("motion", "way", "size"),
+    [
+        ("x: {acceleration: {table: [[0, 0], [0.5, -8], [1, 0]]}}", [-1.0, 0.0], 1.0),
+        ("y: {velocity: 2}", [0.0, 1.0], 1.0),
+        ("y: {acceleration: {formula: 'sin(6*t) - 1'}}", [0.0, -1.0], 1.0),
+        ("x: {position: 1 - 0.2*t^2}", [-1.0, 0.0], 1.0),
+        ("y: {acceleration: 0}", [0.0, 1.0], 1.0),  # as it moves at the start
+        ("angle: {velocity: 3}", None, 1.0),
+        ("angle: {acceleration: -3}", None, -1.0),
+    ],
+)
+def test_the_arrow_of_a_prescribed_motion_points_the_way_it_goes(
+    motion: str, way: list[float] | None, size: float
+) -> None:
+    (symbol,) = [each for each in symbols(case_of(motion=motion)) if each.kind in ("motion", "turning")]
+    assert (symbol.way if way is None else symbol.way.tolist()) == way
+    assert symbol.size == size

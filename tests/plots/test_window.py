@@ -333,7 +333,7 @@ def bodies_lines(source: Any) -> list[Any]:
 def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(
     names: tuple[str, str], seconds: tuple[str, str]
 ) -> None:
-    from mdstopo.plots.designs_plot import FIRST, SECOND, draw_pair
+    from mdstopo.plots.designs_plot import MORE, draw_pair
     from mdstopo.plots.style import styled
 
     text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
@@ -347,22 +347,21 @@ def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(
         both.append(source)
     with styled() as module:
         figure = draw_pair(module, *both, ("first", "second"))
-    found = []
-    for axis, own in ((figure.axes[2], FIRST), (figure.axes[3], SECOND)):
-        wanted = matplotlib.colors.to_rgba(own)
-        found.append(
-            sum(
-                len(each.get_segments())
-                for each in axis.collections
-                if len(each.get_colors()) and tuple(each.get_colors()[0]) == wanted
-            )
+    wanted = matplotlib.colors.to_rgba(MORE)
+    found = [
+        sum(
+            len(each.get_segments())
+            for each in axis.collections
+            if len(each.get_colors()) and tuple(each.get_colors()[0]) == wanted
         )
+        for axis in figure.axes[2:4]
+    ]
     assert found == [1, 1]
 
 
 @pytest.mark.parametrize("largest", [1.0, 0.25])
 def test_two_designs_are_as_wide_as_they_are_beside_each_other(largest: float) -> None:
-    from mdstopo.plots.designs_plot import SECOND, draw_pair
+    from mdstopo.plots.designs_plot import MORE, draw_pair
     from mdstopo.plots.style import styled
     from mdstopo.plots.thickness import alike
 
@@ -377,7 +376,7 @@ def test_two_designs_are_as_wide_as_they_are_beside_each_other(largest: float) -
     assert one.what == other.what == f"alpha, up to {0.8 * largest:.3g}"
     with styled() as module:  # each member is twice as large in the second
         figure = draw_pair(module, *both, ("first", "second"))
-    wanted = matplotlib.colors.to_rgba(SECOND)
+    wanted = matplotlib.colors.to_rgba(MORE)
     drawn = [
         len(each.get_segments()) for each in figure.axes[3].collections if tuple(each.get_colors()[:1].flat) == wanted
     ]

@@ -154,6 +154,19 @@ def test_members_of_one_alpha_have_one_size():
     assert outcome.sizes.members == 1
 
 
+def test_how_far_a_long_choice_is_is_told(monkeypatch):
+    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.sizes.SAID_EVERY", 0.0)
+    told = []
+    outcome = run_session(case_with("[0, 0.4, 1]"), notify=told.append)
+    rows = [sentence for sentence in told if sentence.startswith("choosing sizes: ")]
+    assert len(rows) >= outcome.sizes.nodes
+    assert rows[-1] == (
+        f"choosing sizes: {outcome.sizes.nodes:,} nodes, {outcome.sizes.evaluations:,} evaluations, "
+        f"best choice {outcome.sizes.objective:.6g}"
+    )
+
+
 def test_a_stopped_choice_is_kept_and_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
     case = case_with("[0, 0.4, 1]")

@@ -86,6 +86,10 @@ def test_a_motion_in_space_is_stored_printed_and_exported(said: Say, tmp_path: P
     assert {"q arm.qz", "v hull.turn_x", "card.Mz"} <= set(rows[0])
     members = list(csv.reader(io.StringIO((tmp_path / "linkage.csv" / "members.csv").read_text())))
     assert members[0][:8] == ["member", "group", *(f"{e}_{a}_m" for e in ("from", "to") for a in "xyz")]
+    assert members[0][8] == "length_m"
+    for row in members[1:]:
+        ends = np.array(row[2:8], dtype=float)
+        assert float(row[8]) == pytest.approx(np.linalg.norm(ends[3:] - ends[:3]), rel=1e-15)
 
 
 def test_results_in_space_have_pictures_and_a_page(said: Say, tmp_path: Path) -> None:

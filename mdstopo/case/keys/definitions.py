@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.text.quantities import as_si
 from mdstopo.case.text.reading import BAD, Reading, found
 from mdstopo.case.text.scalars import to_float
 from mdstopo.case.text.words import inside, shown
@@ -138,9 +139,15 @@ def formula_in(node: Node, path: str, names: Any, reading: Reading) -> Formula |
     try:
         return parse(text, names)
     except FormulaError as error:
-        reading.mistake(path, str(error), node)
+        reading.mistake(path, f"{error}{_without_unit(path, node.text)}", node)
         reading.ignore(node)
         return None
+
+
+def _without_unit(path: str, text: str) -> str:
+    """What a defined number with a unit has to be, for the end of a message; empty where there is no such thing."""
+    number = as_si(text) if path.startswith(f"{SECTION}.") else None
+    return "" if number is None else f"; defined numbers are in SI units, without them: write {number:.15g}"
 
 
 class _Names:

@@ -262,7 +262,8 @@ class Signals(Value):
         """The quantities over time at a node of the file, a signal each, or BAD with a mistake noted."""
         if self.formula and (is_formula(node) or self._is_text(node)):
             number = "a number, " if self.constant else ""
-            instead = f"allowed is {number}an expression of t, or {{table: rows {self.rows.row_text}}}"
+            own = "; numbers of its own have names in {formula: ..., parameters: {...}}"
+            instead = f"allowed is {number}an expression of t, or {{table: rows {self.rows.row_text}}}{own}"
             return read_formulas(node, self.names, path, reading, instead)
         if node.kind == MAPPING and "table" not in node.entries and "file" in node.entries:
             return self._split(self.rows.read(node, path, reading))
@@ -274,13 +275,15 @@ class Signals(Value):
         if len(self.names) == 1:
             text = node.kind == SCALAR and isinstance(node.scalar(), (str, type(None))) and not has_unit(node)
             if not self.constant or node.kind != SCALAR or text:
-                allowed = f"{'a number or ' if self.constant else ''}{{table: rows {self.rows.row_text}}}"
+                others = ("a number or " if self.constant else "") + ("an expression of t or " if self.formula else "")
+                allowed = f"{others}{{table: rows {self.rows.row_text}}}"
                 reading.mistake(path, f"found {found(node)}, allowed is {allowed}", node)
                 return BAD
             value = Number().read(node, path, reading)
             return BAD if value is BAD else (value,)
         if node.kind != SEQUENCE or len(node.items) != len(self.names):
-            allowed = f"[{', '.join(self.names)}] or {{table: rows {self.rows.row_text}}}"
+            formula = ", {formula: expressions of t}" if self.formula else ""
+            allowed = f"[{', '.join(self.names)}]{formula} or {{table: rows {self.rows.row_text}}}"
             reading.mistake(path, f"found {found(node)}, allowed is {allowed}", node)
             return BAD
         parts = [

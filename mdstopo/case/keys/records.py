@@ -379,7 +379,7 @@ class Record(Value):
         """Notes unknown keys; returns the right words they were probably meant to be."""
         meant: set[str] = set()
         elsewhere = dict(self.elsewhere)
-        for text, (key, _) in node.entries.items():
+        for text, (key, value) in node.entries.items():
             if text in known:
                 continue
             if text in elsewhere:
@@ -391,6 +391,8 @@ class Record(Value):
             if best is not None:
                 meant.add(best)
                 hint = f", did you mean {best!r}?"
+            elif text.isdigit() and value.kind == SCALAR and not value.text:  # {mass: 1,5}
+                hint = " (the decimal sign is a point),"
             message = f"unknown key {shown(text)}{hint or ','} allowed are {listed(known)}{self._or_alone()}"
             reading.mistake(inside(path, text), message, key)
         return meant

@@ -10,6 +10,7 @@ from typing import Any
 
 from mdstopo.case.text.errors import Mistake
 from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node, YamlSyntaxError, parse
+from mdstopo.case.text.quantities import PATTERN
 from mdstopo.case.text.words import count_text, inside, shown
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[([0-9]{1,9})\]")
@@ -21,7 +22,8 @@ def apply_overrides(
     """The tree with every override applied in order, and the overrides as text (key path -> YAML).
 
     A key path is written as in messages: ``solver.step``, ``constraints[0].equals`` (also ``.0.``).
-    Mappings on the way that are missing are made. A value that is text is read as YAML, others as they are.
+    Mappings on the way that are missing are made. A value that is text is read as YAML, others as they are; but a
+    number with a unit needs no quotation marks, which a shell takes away. ``null`` removes the key.
     """
     texts: dict[str, str] = {}
     for key, value in overrides.items():
@@ -74,8 +76,17 @@ def _value(value: Any, report: Callable[[Mistake], None], origin: str) -> Node:
         if node is None:
             node = Node(SCALAR, 1, 1, origin)
             node.plain = True
+        _quote_units(node)
         return node
     return node_of(value, origin)
+
+
+def _quote_units(node: Node) -> None:
+    """Take numbers with a unit, `40 mm`, as if they stood in quotation marks."""
+    for part in (*node.items, *(value for _, value in node.entries.values())):
+        _quote_units(part)
+    if node.kind == SCALAR and node.plain and isinstance(node.scalar(), str) and re.match(PATTERN, node.text):
+        node.plain = False
 
 
 def node_of(value: Any, origin: str, depth: int = 0) -> Node:
@@ -121,12 +132,17 @@ def as_yaml(value: Any) -> str:
     return json.dumps(str(value))
 
 
+def _is_empty(node: Node) -> bool:
+    """Whether nothing stands there, or `null`."""
+    return node.kind == SCALAR and node.plain and node.scalar() is None
+
+
 def _replaced(node: Node, steps: list[str | int], value: Node, path: str, origin: str) -> Node:
     """A copy of `node` with the value at `steps` replaced; everything beside the way is shared."""
     if not steps:
         return value
     step, rest = steps[0], steps[1:]
-    empty = node.kind == SCALAR and node.plain and node.scalar() is None
+    empty = _is_empty(node)
     if node.kind == SEQUENCE:
         index = int(step) if isinstance(step, int) or (step.isascii() and step.isdigit()) else None
         if index is None or index >= len(node.items):
@@ -143,6 +159,9 @@ def _replaced(node: Node, steps: list[str | int], value: Node, path: str, origin
         twin.kind = MAPPING
         twin.entries = dict(node.entries)
         key, old = node.entries.get(step, (None, None))
+        if not rest and value.text and _is_empty(value):  # an empty text is a mistake: something was forgotten
+            twin.entries.pop(step, None)
+            return twin
         if key is None:
             key = Node(SCALAR, 1, 1, origin)
             key.text = step

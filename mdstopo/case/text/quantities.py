@@ -67,6 +67,10 @@ _LONGEST = 100
 PATTERN = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*[A-Za-zµ°1/].*$"
 
 
+#: units of keys whose numbers can be anything: their users choose it, or it is that of another number
+UNSTATED = ("", "yours", "the number's unit")
+
+
 class QuantityError(ValueError):
     """Why a text is no number in the unit that is needed: a sentence."""
 
@@ -81,16 +85,35 @@ def in_si(text: str, needed: str) -> float:
     """The number that a text like `40 mm` means in the SI unit `needed`. Raises QuantityError."""
     from fractions import Fraction
 
+    if needed in UNSTATED:
+        raise QuantityError("allowed is a number: units are read where a key has one of its own")
     found = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if found is None:
         raise QuantityError("allowed is a number and its unit, such as '40 mm'")
     unit = unit_of(found[2])
     if unit.dimension != unit_of(needed).dimension:
         raise QuantityError(f"allowed is a number in {needed}, or in a unit that measures the same")
+    if needed.startswith("rad/s") and "Hz" in found[2]:
+        # 1 Hz is a turn a second, 2 pi rad/s; as 1/s it would be taken for 1 rad/s
+        raise QuantityError(f"allowed is a number in {needed}; turns are counted in rev/s or rpm, not in Hz")
     try:
         return float(Fraction(found[1]) * unit.factor) * math.pi**unit.turns
     except OverflowError:
         raise QuantityError("allowed is a number that is finite in SI units") from None
+
+
+def as_si(text: str) -> float | None:
+    """The number that a text like `40 mm` means in SI units, whatever it measures; None where it is no such text."""
+    from fractions import Fraction
+
+    found = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
+    if found is None:
+        return None
+    try:
+        unit = unit_of(found[2])
+        return float(Fraction(found[1]) * unit.factor) * math.pi**unit.turns
+    except (QuantityError, OverflowError):
+        return None
 
 
 @functools.cache
