@@ -24,8 +24,10 @@ LOOSE, LOOSELY_SETTLED = 1e-5, 1e-3
 MOST = 300
 #: turns of fit and deviations at most, and how far deviations may still change, relative
 TURNS, SETTLED = 40, 1e-6
-#: a deviation that is estimated is at least this share of the largest value
+#: a deviation that is estimated is at least this share of the largest value, or of a unit where all are zero
 LEAST_DEVIATION = 1e-12
+#: standard deviations that a value may be off at the start: squares of more are soon too large for numbers
+LARGEST = 1e100
 #: how many standard deviations the median of magnitudes is, of normal residuals
 MEDIAN = 0.6744897501960817
 #: why SciPy's least_squares has ended, by its status
@@ -143,7 +145,12 @@ def deviation_of(problem: FitProblem, misfit: FloatArray, y: FloatArray) -> floa
         size = float(np.median(np.abs(misfit)) / (MEDIAN * np.sqrt(share)))
     else:
         size = float(np.sqrt(np.mean(misfit**2) / share))
-    return max(size, LEAST_DEVIATION * float(np.abs(y).max()), np.finfo(float).tiny)
+    return max(size, _least_deviation(y))
+
+
+def _least_deviation(y: FloatArray) -> float:
+    """Below which no deviation of values y (n,) is estimated."""
+    return max(LEAST_DEVIATION * (float(np.abs(y).max()) or 1.0), np.finfo(float).tiny)
 
 
 def minimum(
@@ -184,6 +191,8 @@ def minimum(
         trouble, misfit = problem.misfit(whole(u))
         if trouble and evaluations == 1:
             raise MotionError(trouble)
+        if evaluations == 1 and (too_large := _too_large(problem, misfit, deviation)):
+            raise MotionError(too_large)
         if not trouble:
             seen(Evaluated(whole(u), misfit, deviation))
         return misfit / deviation
@@ -208,6 +217,17 @@ def minimum(
     reason = REASONS.get(found.status, found.message)
     x = whole(found.x)
     return _at(problem, x, problem.misfit(x)[1], deviation, status, reason, evaluations)
+
+
+def _too_large(problem: FitProblem, misfit: FloatArray, deviation: FloatArray) -> str:
+    """Which series is so many deviations (n,) off by a misfit (n,) that nothing can be computed of it; empty: none."""
+    for each, part in zip(problem.measured, problem.parts, strict=True):
+        if not np.all(np.abs(misfit[part]) < LARGEST * deviation[part]):
+            return (
+                f"{each.series.name} is more than {LARGEST:.0e} of its deviations off, too many to compute with: "
+                "look at deviation, value_scale and offset"
+            )
+    return ""
 
 
 def _at(
@@ -235,7 +255,7 @@ def _cost(problem: FitProblem, residuals: FloatArray) -> float:
 
 def _spread(y: FloatArray) -> float:
     """A first guess of a deviation."""
-    return max(float(np.std(y)), LEAST_DEVIATION * float(np.abs(y).max()), np.finfo(float).tiny)
+    return max(float(np.std(y)), _least_deviation(y))
 
 
 def starts(problem: FitProblem) -> list[FloatArray]:

@@ -71,10 +71,7 @@ def _one_row(x: Floats, lower: Floats, upper: Floats, a: Floats, b: float) -> Fl
     """Projection on one row that is known to be active: a . clip(x - lambda a) falls with lambda."""
     least = np.where(a > 0.0, lower, upper)
     most = np.where(a > 0.0, upper, lower)
-    size = float(np.einsum("i,i->", np.abs(a), np.maximum(np.abs(lower), np.abs(upper)))) + abs(b)
-    low, high = float(np.einsum("i,i->", a, least)), float(np.einsum("i,i->", a, most))
-    if low > b + FEASIBLE * size or high < b - FEASIBLE * size:
-        raise InfeasibleRows("no design within the bounds satisfies the volume row")
+    _refuse_out_of_reach(lower, upper, LinearRows(a[None], np.array([b]), np.array([True])))
     moving = a != 0.0
     reach_low = (x[moving] - least[moving]) / a[moving]
     reach_high = (x[moving] - most[moving]) / a[moving]
@@ -99,7 +96,18 @@ def _one_row(x: Floats, lower: Floats, upper: Floats, a: Floats, b: float) -> Fl
     return np.asarray(np.clip(x - multiplier * a, lower, upper))
 
 
+def _refuse_out_of_reach(lower: Floats, upper: Floats, rows: LinearRows) -> None:
+    """Raise InfeasibleRows where the bounds leave no design that satisfies a row by itself."""
+    A, b = rows.A, rows.b
+    size = np.einsum("ij,j->i", np.abs(A), np.maximum(np.abs(lower), np.abs(upper))) + np.abs(b)
+    low = np.einsum("ij,ij->i", A, np.where(A > 0.0, lower, upper))
+    high = np.einsum("ij,ij->i", A, np.where(A > 0.0, upper, lower))
+    if np.any((low > b + FEASIBLE * size) | (rows.equal & (high < b - FEASIBLE * size))):
+        raise InfeasibleRows("no design within the bounds satisfies the volume rows")
+
+
 def _several_rows(x: Floats, lower: Floats, upper: Floats, rows: LinearRows) -> Floats:
+    _refuse_out_of_reach(lower, upper, rows)  # the interior point would look for multipliers without an end
     free = upper > lower
     out = np.clip(x, lower, upper)
     if not free.any():

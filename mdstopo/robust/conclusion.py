@@ -12,7 +12,7 @@ from mdstopo.case.responses.response_units import constrained
 from mdstopo.design_problem import sign_of
 from mdstopo.evaluation import Evaluation, FloatArray
 from mdstopo.robust.ensemble import NOMINAL, Ensemble
-from mdstopo.robust.intervals import Estimate
+from mdstopo.robust.intervals import ROUNDING, Estimate
 from mdstopo.robust.points_in_workers import PointWorkers
 from mdstopo.robust.robust_measures import estimate
 from mdstopo.robust.sample import Sample, check_sample
@@ -97,7 +97,7 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, workers: Po
         results.append(
             _robust(
                 objective.name, objective, measure, nominal.objectives[objective.name],
-                found.objectives[objective.name], objectives[:, j], values if enough else None, sample,
+                found.objectives[objective.name], objectives[:, j], values if enough else None, sample, 0.0,
             )
         )  # fmt: skip
     for i, row in rows.items():
@@ -107,6 +107,7 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, workers: Po
             _robust(
                 f"constraints[{i}]", row, measure, float(nominal.constraints[i]) + row.bound,
                 float(found.constraints[i]) + row.bound, here, values if enough else None, sample,
+                case.optimizer.tolerance * (abs(row.bound) or 1.0),
             )
         )  # fmt: skip
     warnings += tuple(_fitted(case, each) for each in results if each.is_fitted)
@@ -131,6 +132,7 @@ def _robust(
     values: FloatArray,
     fresh: FloatArray | None,
     sample: Sample,
+    tolerance: float,
 ) -> Robust:
     """What an objective or a constraint comes to over the sample, and what a fresh sample says of that.
 
@@ -142,6 +144,7 @@ def _robust(
     values (S,): at the points of that sample.
     fresh (V,): at the points of the fresh one; None where there are not enough.
     sample: the design's.
+    tolerance: by how much a constraint may be missed and counts as kept, as for the optimiser.
     """
     sign = sign_of(of) if isinstance(of, Objective) else (-1.0 if of.sense == "at_least" else 1.0)
     if fresh is None or not measure.is_sampled:
@@ -151,8 +154,8 @@ def _robust(
     low, high = (found.low, found.high) if sign > 0.0 else (-found.high, -found.low)
     kept = None
     if isinstance(of, ResponseRow) and of.sense != "equals":
-        kept = float(np.mean(sign * fresh <= sign * of.bound))
-    worse = float(np.mean(sign * fresh > sign * value))
+        kept = float(np.mean(sign * fresh <= sign * of.bound + tolerance))
+    worse = float(np.mean(sign * fresh > sign * value + ROUNDING * abs(value)))
     return Robust(name, measure.words, nominal, value, Estimate(sign * found.value, low, high), worse, kept, sign)
 
 

@@ -351,10 +351,15 @@ class SizeSearch:
         return float(self._missed(choice, x).max(initial=0.0))
 
     def _missed(self, choice: Ints, x: Floats) -> Floats:
-        """(m,) by how much each row is missed, beyond rounding."""
+        """(m,) by how much each row is missed, beyond rounding.
+
+        A sum that is to be equal and has no size in it is left to what varies beside; where nothing does, it has to
+        be met by what is held.
+        """
         paid = self._catalogued.paid(x, choice)
         miss = self._rows.excess(paid)
-        miss = np.where(self._rows.equal, 0.0, miss)
+        left = np.abs(self._rows.A[:, self._others]).max(axis=1, initial=0.0) > 0.0
+        miss = np.where(self._rows.equal, np.where(left, 0.0, np.abs(miss)), miss)
         size = np.abs(self._rows.A) @ np.abs(paid) + np.abs(self._rows.b)
         return np.asarray(miss - ROWS * size)
 

@@ -157,6 +157,8 @@ class Sizes:
         ended = self.outcome.finished or self.outcome.evaluations >= MOST_EVALUATIONS
         if ended and not self.outcome.sizes:
             what = "keeps the constraints" if self.outcome.finished else f"was found in {self.outcome.nodes} nodes"
+            if not self.outcome.members:
+                what += ": no member has at least half of its least size, and all others are left out"
             return RunStatus.FAILED, f"no choice of sizes {what}; the design is the continuous optimum"
         return RunStatus.INTERRUPTED, "stopped on request while sizes were chosen; the best choice so far is saved"
 
@@ -192,11 +194,11 @@ class Sizes:
         rows, dearer = problem.linear, np.zeros(len(x))
         kept = []
         for place, group in self._groups_at().items():
-            positive = [size for size in group.sizes if size > 0.0]
-            if positive and x[place] < KEPT * positive[0]:
+            least = next((size for size in group.sizes if size > 0.0), np.inf)  # none: all are 0, and no member is kept
+            if x[place] < KEPT * least:
                 lower[place] = upper[place] = begin[place] = group.sizes[0]
                 dearer[place] = group.prices[0] - group.sizes[0]
-            elif positive:
+            else:
                 kept.append(place)
         held = Within(problem, [0], lower, upper, replace(rows, b=rows.b - rows.A @ dearer))
         held.initial = begin
@@ -255,7 +257,7 @@ class Sizes:
         worse = (progress.objective - self._continuous) / size
         return (
             f"sizes of {self._kept} members chosen: {how}, {progress.evaluations} evaluations; "
-            f"{worse:.3%} worse than the continuous optimum"
+            f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -189,3 +190,25 @@ def test_other_commands_take_a_case_with_a_fit(folder: Path, capsys: pytest.Capt
     said = capsys.readouterr().out
     assert "2 numbers to fit" in said
     assert "displacement y of stone" in said
+
+
+@pytest.mark.parametrize("key", ["deviation=1e-300", "offset=1e308"])
+def test_values_that_are_off_by_more_deviations_than_can_be_squared_fail_by_the_name_of_their_series(
+    folder: Path, capsys: pytest.CaptureFixture[str], key: str
+) -> None:
+    changes = ["--set", "fit.measured.height.deviation=0.001", "--set", f"fit.measured.height.{key}"]
+    assert run_group(["fit", "fall.yaml", *changes]) == 1
+    assert "failed - height is more than 1e+100 of its deviations off" in capsys.readouterr().out
+
+
+def test_a_series_of_zeros_that_is_met_exactly_is_fitted_without_an_overflow(folder: Path) -> None:
+    """Nothing is left of it, so that its deviation is the least there is: a share of a unit."""
+    (folder / "fall.csv").write_text("t,y\n" + "".join(f"0.{i},0\n" for i in range(1, 8)), encoding="utf-8")
+    across = {"displacement": {"body": "stone", "component": "x"}}
+    changes = [f"fit.measured.height.response={json.dumps(across)}", "fit.measured.height.offset={lower: -1, upper: 1}"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert run_group(["fit", "fall.yaml", *(word for each in changes for word in ("--set", each))]) == 0
+    found = result(folder / "results" / "fall.fit.h5")
+    assert found["series"][0]["deviation"] == [1e-12] * 7
+    assert abs(found["estimates"][2]["value"]) < 1e-12

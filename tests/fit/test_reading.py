@@ -137,3 +137,57 @@ def test_a_bad_table_is_refused_with_its_line(
 def test_other_commands_do_not_read_the_files(folder: Path) -> None:
     case = load_case(folder / "drop.yaml")
     assert dict(case.files) == {}
+
+
+def table(folder: Path, text: str, **columns: object) -> list[float]:
+    """The values of a series of a table."""
+    (folder / "height.csv").write_text(text, encoding="utf-8")
+    case = load_case(folder / "drop.yaml", {f"fit.measured.height.{key}": value for key, value in columns.items()})
+    return read_measured(case)[0].y.tolist()
+
+
+def test_columns_between_tabs_may_have_blanks_in_their_names_and_gaps(folder: Path) -> None:
+    text = "t s\tforce N\tway\n" + "".join(f"0.0{i}\t{'' if i == 2 else i}\t{10 * i}\n" for i in range(1, 6))
+    assert table(folder, text, time="t s", value="way") == [10.0, 20.0, 30.0, 40.0, 50.0]
+    told = read(folder, text, time="t s", value="force N")
+    assert told == ["fit.measured.height.file: height.csv, line 3: found nothing, allowed is a finite number "
+                    "(column force N)"]  # fmt: skip
+
+
+def test_tabs_in_a_row_that_only_align_columns_are_one_gap(folder: Path) -> None:
+    rows = "".join(f"0.0{i}\t\t{i}\n" for i in range(1, 6))
+    assert table(folder, rows) == table(folder, "t\t\ty\n" + rows, time="t", value="y") == [1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def test_quoted_names_may_have_commas(folder: Path) -> None:
+    text = '"t, s","a","b"\n' + "".join(f"0.0{i},{i},{10 * i}\n" for i in range(1, 6))
+    assert table(folder, text, time="t, s", value="a") == [1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def test_empty_cells_at_the_end_of_rows_are_no_columns(folder: Path) -> None:
+    text = "t,y\n" + "".join(f"0.0{i},{i},,\n" for i in range(1, 6))
+    assert table(folder, text, time="t", value="y") == [1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "told"),
+    [
+        ("t,y", "0,0{i},1,5", "the row has 4 cells, the header line has 2; numbers have a point, not a comma"),
+        ("", "0,0{i},1,5", ""),
+        ("t, s,y,z", "0.0{i},1,5", "the row has 3 cells, the header line has 4; commas between columns say"),
+        ("t y z", "0.0{i} 1", "the row has 2 cells, the header line has 3; commas between columns say"),
+    ],
+)
+def test_rows_with_other_cells_than_columns_are_refused(folder: Path, head: str, row: str, told: str) -> None:
+    """A decimal comma, a comma in a name, a gap between blanks: the value was taken from another column."""
+    if not told:  # without a header line the first row says how many there are
+        head, told = "0.01,1", "line 2: the row has 4 cells, the first row has 2; numbers have a point"
+    text = head + "\n" + "".join(row.format(i=i) + "\n" for i in range(2, 7))
+    columns = {"time": 0, "value": 1}
+    assert any(told in each for each in read(folder, text, **columns))
+
+
+def test_a_name_that_two_columns_have_is_refused(folder: Path) -> None:
+    text = "t,y,y\n" + "".join(f"0.0{i},{i},{10 * i}\n" for i in range(1, 6))
+    assert any("found 2 columns called 'y'" in each for each in read(folder, text, time="t", value="y"))
+    assert table(folder, text, time="t", value=2) == [10.0, 20.0, 30.0, 40.0, 50.0]

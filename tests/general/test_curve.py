@@ -54,6 +54,37 @@ def test_a_body_that_rests_on_a_knot_stays_there():
     assert found.work["steps"] < 10
 
 
+@pytest.mark.parametrize(
+    ("mass", "speed", "rows"),
+    [
+        (5.6, 10.8, [[-1, -127], [0, 0], [0.1, 12.7], [0.1015, 2857], [1, 2885]]),
+        (0.33, 1.473, [[-1, -1.246], [0, 0], [0.1, 0.1246], [0.10255, 2.98], [1, 3.009]]),
+        (0.15, 291.0, [[-1, -3.7], [0, 0], [0.1, 0.37], [0.1000056, 20417], [1, 20621]]),
+    ],
+)
+def test_a_steep_piece_behind_a_knot_is_passed(mass, speed, rows):
+    """A step that is far too long there takes its force from a steep cubic, far beyond the end of the cubic, and ends
+    at 1e189 m: relative to a motion as large as that no error counted, and the step was kept."""
+    data = {
+        "format": 1,
+        "time": {"end": 1.2 / speed},
+        "bodies": {"a": {"mass": mass, "inertia": 1, "position": [1, 0], "velocity": [speed, 0]}},
+        "members": {
+            "s": {
+                "from": {"body": "ground", "at": [-5, 0]},
+                "to": {"body": "a", "at": [1, 0]},
+                "law": {"type": "curve", "curve": rows},
+            }
+        },
+        "design": {"initial": 1},
+        "objectives": {"E": {"response": "energy", "over_time": "max"}},
+    }
+    for tolerance in (1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
+        found = evaluate(read_case(json.dumps({**data, "solver": {"tolerance": tolerance}})))
+        assert found.status.ok, found.message
+        assert found.objectives["E"] == pytest.approx(0.5 * mass * speed**2, rel=max(10 * tolerance, 1e-8))
+
+
 #: a measured force of 60 rows
 MEASURED = [[x, 60.0 * np.tanh(10.0 * x) + 50.0 * x] for x in np.linspace(-0.6, 0.9, 60).tolist()]
 

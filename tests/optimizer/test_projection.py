@@ -1,5 +1,7 @@
 """The projection is the nearest feasible design."""
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -86,3 +88,14 @@ def test_rows_that_contradict_one_another_are_named():
     linear = LinearRows(np.ones((2, 3)), np.array([1.0, 2.0]), np.array([True, True]))
     with pytest.raises(InfeasibleRows):
         project(np.full(3, 0.5), np.zeros(3), np.ones(3), linear)
+
+
+@pytest.mark.parametrize(("slope", "least"), [(0.25, 2.95), (1.0, 2.75), (0.5, 2.5), (0.5, 1.25)])
+def test_rows_that_are_out_of_reach_are_refused_without_an_overflow(slope, least):
+    """x is at least 1.25 or more by its row, and at most 1 by its bound: multipliers grew until they overflowed."""
+    rows = LinearRows(np.array([[slope, 1], [-slope, -1]]), np.array([5, -least * slope]), np.zeros(2, dtype=np.bool_))
+    lower, upper = np.array([0.8, 0.0]), np.array([1.0, 0.0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(InfeasibleRows):
+            project(np.array([1.0, 0.0]), lower, upper, rows)

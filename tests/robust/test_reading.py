@@ -273,3 +273,10 @@ def test_files_that_scenarios_name_are_part_of_the_case(tmp_path, stated):
     before = case.files["wave.csv"]
     (tmp_path / "wave.csv").write_text("0, 1\n1, 3\n")
     assert read_case(text(section), path=tmp_path / "case.yaml").files["wave.csv"] != before
+
+
+def test_a_lognormal_deviation_whose_square_is_too_large_for_a_number_is_refused_at_its_place():
+    section = {"parameters": {"bodies.torso.mass": {"lognormal": {"deviation": 1e300}}}}
+    ((place, told),) = refused(section)
+    assert place == "uncertainty.parameters.'bodies.torso.mass'.lognormal.deviation"
+    assert told == "found 1e+300, allowed is at most 1e+100 times the mean 60"

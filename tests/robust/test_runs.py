@@ -320,3 +320,21 @@ def test_gradient_compares_methods_and_differences(tmp_path, capsys, monkeypatch
     methods = json.loads(capsys.readouterr().out)["methods"]
     assert methods["adjoint"]["differences"]["G"] < 1e-6
     assert methods["direct"]["disagreement"]["G"] < 1e-9
+
+
+def test_points_at_which_a_limit_is_missed_by_less_than_the_tolerance_count_as_keeping_it():
+    """The worst point is at the limit, to the optimiser's tolerance: half of the fresh sample is at that point."""
+    section = uncertain(
+        parameters={"bodies.torso.mass": {"discrete": [[55, 0.5], [66, 0.5]]}},
+        sample=4,
+        validation=30,
+        constraints={"0": {"measure": "worst"}},
+    )
+    limit = {"displacement": {"body": "torso", "relative_to": "vehicle"}}
+    rows = [{"response": limit, "over_time": "max", "limit": 0.12}, {"volume": "all", "equals": 6}]
+    outcome = run_session(read(section, constraints=rows))
+    assert outcome.status == "converged"
+    assert 0.0 < outcome.constraints[0] < 1e-6 * 0.12
+    found = outcome.conclusion.of("constraints[0]")
+    assert found.kept == 1.0
+    assert found.worse == 0.0

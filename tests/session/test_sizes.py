@@ -245,3 +245,29 @@ def test_prices_are_not_lost_in_a_sum_of_lengths_that_vary():
     more = [("members:\n", f"{wall}members:\n"), ("loads:\n", f"{ropes}loads:\n")]
     with pytest.raises(CaseError, match=r"design\.catalogue\.straps: .* there prices have to be the sizes"):
         run_session(case_with("{sizes: [0, 1], prices: [0, 2]}", replace=more))
+
+
+@pytest.mark.parametrize("sizes", ["[0, 0.5, 1]", "[0.5, 1]"])
+def test_a_sum_that_is_to_be_equal_is_not_passed_where_all_members_have_their_least_size(sizes):
+    """All alphas are 0.2, so that no member is kept: the volume would be 0, or 4, where 1.6 is asked for."""
+    evenly = [("{initial: 0.3", "{shared: [straps], initial: 0.3"), ("limit: 3.5", "equals: 1.6")]
+    outcome = run_session(case_with(sizes, replace=evenly))
+    assert outcome.status is RunStatus.FAILED
+    assert "no choice of sizes keeps the constraints: no member has at least half of its least size" in outcome.reason
+    assert outcome.alpha.tolist() == pytest.approx([0.2] * 8)
+    assert outcome.constraints.tolist() == pytest.approx([0.0], abs=1e-12)
+
+
+def test_members_whose_only_size_is_zero_are_left_out():
+    outcome = run_session(case_with("[0]"))
+    assert outcome.status is RunStatus.CONVERGED
+    assert outcome.alpha.tolist() == [0.0] * 8
+    assert outcome.sizes.sizes == {"straps": {0.0: 8}}
+
+
+def test_a_choice_that_is_better_than_the_continuous_optimum_is_told_as_better():
+    """With prices below the sizes more is built than alphas could pay."""
+    outcome = run_session(case_with("{sizes: [0, 0.4, 1], prices: [0, 0.1, 0.3]}"))
+    assert outcome.sizes.objective < outcome.sizes.continuous
+    gain = (outcome.sizes.continuous - outcome.sizes.objective) / outcome.sizes.continuous
+    assert outcome.reason.endswith(f"{gain:.3%} better than the continuous optimum")

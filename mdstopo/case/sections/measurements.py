@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -133,16 +135,66 @@ def _table(name: str, reading: Reading) -> _Table | str:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         return f"the file {shown(name)} is not text in UTF-8"
-    rows: list[list[str]] = []
-    lines: list[int] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.lstrip().startswith("#") and (cells := [cell.strip() for cell in cells_of(line)]):
-            rows.append(cells)
-            lines.append(number)
+    written = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    tabs = bool(written) and _has_tabs(written[0][1])
+    rows = [_cells(line, tabs) for _, line in written]
+    lines = [number for number, _ in written]
     names: tuple[str, ...] = ()
     if rows and all(number_in(cell) is None for cell in rows[0]):
         names, rows, lines = tuple(cell.strip("\"'") for cell in rows[0]), rows[1:], lines[1:]
-    return _Table(names, rows, lines)
+    blanks = bool(written) and not tabs and _separator(written[-1][1]) == " "
+    odd = _odd_width(names, rows, lines, blanks)
+    return f"{name}, {odd}" if odd else _Table(names, rows, lines)
+
+
+def _has_tabs(first: str) -> bool:
+    """Whether tabs stand between columns, by the first line: not where several in a row only align them."""
+    return "\t" in first and _separator(first) == " " and all(cell.strip() for cell in first.rstrip().split("\t"))
+
+
+def _separator(line: str) -> str:
+    """What stands between the cells of a line, beside quoted ones; a blank for all blanks."""
+    bare = re.sub(r'"[^"]*"', "", line)
+    return next((each for each in ",;" if each in bare), " ")
+
+
+def _cells(line: str, tabs: bool) -> list[str]:
+    """The cells of a line."""
+    if '"' in line:
+        between = "\t" if tabs else _separator(line)
+        cells = next(csv.reader([line.strip()], delimiter=between, skipinitialspace=True))
+    else:
+        cells = line.split("\t") if tabs else cells_of(line)
+    return [cell.strip() for cell in cells]
+
+
+def _filled(cells: Sequence[str]) -> int:
+    """How many cells there are, without empty ones at the end."""
+    return max((k for k, cell in enumerate(cells, start=1) if cell), default=0)
+
+
+def _odd_width(names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int], blanks: bool) -> str:
+    """Which row has other cells than there are columns, so that nobody knows which cell belongs to which; empty: none.
+
+    That is one with more, one with fewer between blanks, and the first where all have fewer than the header line names.
+    names: of that line, none without one. rows, lines: the others, and where they stand. blanks: whether nothing but
+    blanks is between cells.
+    """
+    if not rows:
+        return ""
+    width = _filled(names or rows[0])
+    there = f"the {'header line' if names else 'first row'} has {width}"
+    short = blanks or (bool(names) and max(map(len, rows)) < width)
+    for row, line in zip(rows, lines, strict=True):
+        found = _filled(row)
+        if found > width or (short and found < width):
+            why = "numbers have a point, not a comma" if found > width else "commas between columns say which is empty"
+            return f"line {line}: the row has {found} cells, {there}; {why}"
+    return ""
 
 
 def _place(column: Column, table: _Table) -> int | str:
@@ -152,6 +204,8 @@ def _place(column: Column, table: _Table) -> int | str:
         if column < width:
             return column
         return f"found the column number {column}, the file has {width} columns, numbered from 0"
+    if table.names.count(column) > 1:
+        return f"found {table.names.count(column)} columns called {shown(column)}: state the number of one, from 0"
     if column in table.names:
         return table.names.index(column)
     if not table.names:
