@@ -43,6 +43,8 @@ FRESH = 1e-5
 GRADIENT_SHARE = 1e-5
 # What a residual may be at most, in shares of the violation that it says cannot be made smaller.
 RESIDUAL_SHARE = 0.1
+# The largest objective, row or slope of a usable design: steps need squares of them.
+LARGEST = 1e140
 
 
 def residual_unit(state: GsaoState, steepest: float, steepest_row: float = 0.0) -> float:
@@ -58,9 +60,11 @@ def why_unusable(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
     if sample.status is Status.OK:
         numbers = (sample.rows, sample.constraint_rows, sample.constraint_gradients)
         known = isfinite(sample.objective) and all(finite(number) for number in numbers if number.size)
-        if known and len(sample.rows) and finite(steepest(sample.gradients)):
-            return ""
-        return Status.NON_FINITE.value
+        slopes = steepest(sample.gradients) if known and len(sample.rows) else np.full(1, inf)
+        if not finite(slopes):
+            return Status.NON_FINITE.value
+        most = max(abs(sample.objective), float(np.abs(sample.rows).max()), float(slopes.max()))
+        return "" if most <= LARGEST else f"the objective or a slope of it is {most:.2g}, too large to go on with"
     return sample.failure
 
 

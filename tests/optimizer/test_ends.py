@@ -340,3 +340,14 @@ def test_a_bound_takes_a_constraint_that_carries_nothing_whatever_it_costs() -> 
     space = FeasibleSet(np.zeros(1), np.ones(1), LinearRows.none(1), np.ones(1))
     trial = Trial(np.zeros(1), np.array([1.0, 0.0]), np.zeros(0), np.zeros(2), 0.0, True)
     assert lower_bound(rows, trial, np.array([0.3]), space, np.array([5.0])) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("size", [1e160, 1e300])
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_objective_whose_square_is_no_number_fails_with_its_size(size: float, count: int) -> None:
+    def functions(x):
+        return np.full(count, size * x.sum()), np.full((count, len(x)), size)
+
+    state = ended(Toy(functions, np.full(3, 0.5), 0.0, 1.0))
+    assert state.status is RunStatus.FAILED
+    assert f"{1.5 * size:.2g}, too large to go on with" in state.reason
