@@ -198,7 +198,8 @@ class Contact:
         """Of a touch: until it opens, until its force would pull (or push again), until it slides over an end."""
         k, c = self.keys["stiffness"], self.keys.get("damping", 0.0)
         pull = (1.0 if self.mode == ACTS else -1.0) * self.push(depth, rate) / (k + c)
-        return depth, pull if c > 0.0 else np.inf, s, self.length - s
+        # in space s is the room within all ends, and may be infinite as the length is
+        return depth, pull if c > 0.0 else np.inf, s, self.length - s if np.isfinite(self.length) else np.inf
 
     def margin(self, s: float, depth: float, rate: float) -> float:
         """How far the mode is from its end, m."""

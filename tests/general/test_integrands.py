@@ -532,6 +532,34 @@ def test_forces_that_joints_hold_at_zero_take_no_more_steps_where_another_integr
     assert found.objectives["U"] == alone.objectives["U"]
 
 
+@pytest.mark.parametrize("response", ["{member_force: {group: g}}", "{acceleration: {body: b, relative_to: a}}"])
+@pytest.mark.parametrize("slides", [False, True])
+def test_forces_and_accelerations_that_joints_hold_at_zero_have_a_mean(slides, response):
+    """Where the bodies slide without turning these are rounding between states, too."""
+    text = FIXED.replace("{member_force: {group: g}}", response)
+    if slides:
+        text = text.replace(
+            "revolute, bodies: [ground, a], at: [0, 0]", "prismatic, bodies: [ground, a], at: [0, 0], axis: [1, 2]"
+        )
+    found, still = evaluate(read_case(text)), evaluate(read_case(text.replace(response, "{velocity: {body: b}}")))
+    assert found.status.ok, found.message
+    assert found.work["steps"] <= still.work["steps"]
+    assert abs(found.objectives["F"]) < 1e-6
+
+
+@pytest.mark.parametrize("response", ["energy", "{member_force: {group: g}}"])
+def test_integrals_are_followed_in_scenes_of_any_force(response):
+    """What counts as rounding is relative to the scene: tiny forces and energies of tiny bodies are not."""
+
+    def mean_square(unit):
+        text = PASSING.replace("MASS", repr(unit)).replace("energy", response).replace("OVER", "rms")
+        law = f"{{type: spring, stiffness: {2e-3 * unit!r}, damping: {1e-6 * unit!r}}}"
+        case = read_case(text.replace("LAW", law), overrides={"solver.integrator": "runge_kutta"})
+        return evaluate(case, gradient=False).objectives["E"] / unit
+
+    assert mean_square(1e-14) == pytest.approx(mean_square(1.0), rel=1e-12)
+
+
 def test_rounding_is_not_halved_on_and_on():
     from mdstopo.general.over_time.quadrature_breakpoints import halves
 

@@ -57,6 +57,11 @@ class Law(Value):
         """Parameters for the kernels: the law's numbers in the order of `numbers`, then what a subclass adds."""
         return [getattr(self, name) for name in numbers(type(self))]
 
+    def in_units(self, units: tuple[str, ...]) -> list[tuple[float, str]]:
+        """Its numbers that are in one of some units, each with its unit."""
+        keys = [(name, unit) for name, unit in _units(cast(Any, type(self))) if unit in units]
+        return [(float(getattr(self, name)), unit) for name, unit in keys]
+
     @property
     def depends_on_rate(self) -> bool:
         """Whether the force depends on velocities or accelerations."""
@@ -158,6 +163,13 @@ def _own_fields(law: Any) -> tuple[Field[Any], ...]:
 @functools.cache
 def _with_role(law: Any, role: str) -> tuple[str, ...]:
     return tuple(field.name for field in _own_fields(law) if field.metadata.get(role))
+
+
+@functools.cache
+def _units(law: Any) -> tuple[tuple[str, str], ...]:
+    """The numbers of a law with their units."""
+    units = {field.name: str(field.metadata["unit"]) for field in _own_fields(law)}
+    return tuple((name, units[name]) for name in _numbers(law))
 
 
 @functools.cache

@@ -280,7 +280,7 @@ class GeneralDriver:
         window = CLOSENESS if rows.window is None else rows.window
         across = self._across() if rows.cones and gradient and self._is_planar else None
         self.quadrature_breakpoints = []
-        followed = followed_integrals(self, self.count) if self._integrated and code == OK else []
+        followed = followed_integrals(self, self.count) if self._integrated and code == OK else {}
         for _ in range(ROUNDS):
             more = quadrature_breakpoints(self, self.count, followed) if code == OK else []
             if not more:

@@ -9,14 +9,14 @@ computed once more with steps that end at these middles; since steps between the
 Steps of fixed length promise no accuracy, and stay as they are.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.over_time.kinks import kinks
-from mdstopo.general.responses.general_responses import LISTED, has_kinks, is_expression, switches_of
-from mdstopo.general.scene.extent import size_of
+from mdstopo.general.over_time.motion_sizes import NOUGHT, motion_sizes, rounding_of
+from mdstopo.general.responses.general_responses import has_kinks, switches_of
 from mdstopo.general.steps.run_start import method_number
 from mdstopo.general.steps.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
@@ -36,28 +36,31 @@ SHARE = 1e-3
 #: halvings of one step at most; after PATIENCE of them a step is given up where one more leaves a larger share of the
 #: difference than VAIN: what is left is rounding
 HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
-#: places and angles below this share of the scene's size, or of a radian, are rounding
-NOUGHT = 1e-12
-
 #: a response that is smaller by this at both ends of a step than in its middle, in this share of all steps, is zero in
 #: truth: joints hold it there, which states keep to and what is between them misses
 MISSED, MOSTLY = 1e-3, 0.75
+#: where inside a step values are compared with those at its ends; and up to how many tolerances, relative to what a
+#: response may be by the motion of the scene, all of them are no more than missed joints where those at the ends are
+#: rounding: in short steps they are no thousand times as large
+INSIDE, BETWEEN = (0.25, 0.5, 0.75), 100.0
 
 #: places (K, 2), and between which two ends each is (K,) -> values (K,)
 Integrand = Callable[[FloatArray, IndexArray], FloatArray]
 
 
-def followed_integrals(driver: DriverWithRun, count: int) -> list[int]:
-    """The responses whose integrals steps have to follow: those that no joints hold at zero. To be asked of a first
-    run, of `count` steps: in steps that are shorter for the sake of others rounding hides it."""
-    return [
-        j
-        for j, kind in enumerate(driver.scene.reductions)
-        if kind.is_integral and not _is_held_at_zero(driver, j, count)
-    ]
+def followed_integrals(driver: DriverWithRun, count: int) -> dict[int, float]:
+    """The responses whose integrals steps have to follow, those that no joints hold at zero, and up to what size each
+    is rounding; 0: that is not known. To be asked of a first run, of `count` steps: in steps that are shorter for the
+    sake of others rounding hides what is held at zero."""
+    integrals = [j for j, kind in enumerate(driver.scene.reductions) if kind.is_integral]
+    if not integrals:
+        return {}
+    sizes = motion_sizes(driver, count)
+    nothing = {j: rounding_of(driver, j, sizes) for j in integrals}
+    return {j: size for j, size in nothing.items() if not _is_held_at_zero(driver, j, count, size)}
 
 
-def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Sequence[int]) -> list[float]:
+def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Mapping[int, float]) -> list[float]:
     """Times at which steps are to end, beside `driver.quadrature_breakpoints`, from the `count` steps of its last
     run. followed: of `followed_integrals`."""
     model, found = driver.scene.model, list[float]()
@@ -76,8 +79,7 @@ def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Sequence
     rule = _rule(driver, count)
     for j, square in integrals:
         integrand = _integrand(driver, j, t, ends, square)
-        nothing = _rounding(driver, j, float(t[-1] - t[0]))
-        nothing = nothing * nothing if square else nothing
+        nothing = followed[j] ** 2 if square else followed[j]
         found += halves(
             t,
             ends,
@@ -90,9 +92,12 @@ def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Sequence
     return found
 
 
-def _is_held_at_zero(driver: DriverWithRun, j: int, count: int) -> bool:
-    """Whether response j, of forces or accelerations, is zero in all states and rounding cannot say so beforehand."""
-    if not has_kinks(driver.scene.model, j) or _rounding(driver, j, 1.0) > 0.0:
+def _is_held_at_zero(driver: DriverWithRun, j: int, count: int, nothing: float) -> bool:
+    """Whether response j is zero in all states, and between them but for what is missed there.
+
+    nothing: up to what size it is rounding; 0: that is not known, and only of what is never negative can values tell.
+    """
+    if nothing == 0.0 and not has_kinks(driver.scene.model, j):
         return False
 
     def size(fraction: float) -> FloatArray:
@@ -100,8 +105,14 @@ def _is_held_at_zero(driver: DriverWithRun, j: int, count: int) -> bool:
         value: FloatArray = driver.sample_response(j, places, False, count, rates=False)[2][:, 0]
         return np.abs(value)
 
-    ends, middles = np.maximum(size(0.0), size(1.0)), size(0.5)
-    return bool(np.count_nonzero(ends < MISSED * middles) >= MOSTLY * count)
+    ends = np.maximum(size(0.0), size(1.0))
+    if nothing > 0.0 and not np.all(ends <= nothing):
+        return False
+    inside = np.array([size(fraction) for fraction in INSIDE])
+    between = nothing * max(1.0, BETWEEN * float(driver.settings[0]) / NOUGHT)
+    if nothing > 0.0 and np.all(inside <= between):
+        return True
+    return bool(np.count_nonzero(ends < MISSED * inside.max(axis=0)) >= MOSTLY * count)
 
 
 def _integrand(driver: DriverWithRun, j: int, t: FloatArray, ends: FloatArray, square: bool) -> Integrand:
@@ -146,16 +157,6 @@ def _rule(driver: DriverWithRun, count: int) -> FloatArray:
     vectors = tables[method, 2, :, : STAGES[method]]
     weighed = vectors[2] != 0.0
     return np.stack([vectors[0][weighed], vectors[2][weighed]])
-
-
-def _rounding(driver: DriverWithRun, j: int, span: float) -> float:
-    """What response j may be by rounding alone, where that can be said: what joints hold at zero is never more."""
-    kind, _, _, _, order, _ = driver.scene.model.response[j].tolist()
-    if is_expression(driver.scene.model, j) or LISTED[kind].needs_accelerations:
-        return 0.0
-    kernels = LISTED[kind]
-    of_lengths = kernels.vector is not None and not kernels.vector.is_turn
-    return float(NOUGHT * (size_of(driver.case) if of_lengths else 1.0) / span**order)
 
 
 def halves(
