@@ -43,8 +43,8 @@ FRESH = 1e-5
 GRADIENT_SHARE = 1e-5
 # What a residual may be at most, in shares of the violation that it says cannot be made smaller.
 RESIDUAL_SHARE = 0.1
-# The largest objective, row or slope of a usable design: steps need squares of them.
-LARGEST = 1e140
+# The largest objective, constraint or slope of a usable design: steps need squares of them.
+LARGEST_ROW = 1e140
 
 
 def residual_unit(state: GsaoState, steepest: float, steepest_row: float = 0.0) -> float:
@@ -58,13 +58,16 @@ def residual_unit(state: GsaoState, steepest: float, steepest_row: float = 0.0) 
 def why_unusable(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
     """Why a sample cannot be used, as a sentence; empty if it can. steepest: as `wide.steepest`."""
     if sample.status is Status.OK:
-        numbers = (sample.rows, sample.constraint_rows, sample.constraint_gradients)
-        known = isfinite(sample.objective) and all(finite(number) for number in numbers if number.size)
-        slopes = steepest(sample.gradients) if known and len(sample.rows) else np.full(1, inf)
+        rows = np.concatenate([[sample.objective], sample.rows, sample.constraint_rows])
+        if not len(sample.rows) or not finite(rows):
+            return Status.NON_FINITE.value
+        slopes = np.concatenate([steepest(sample.gradients), steepest(sample.constraint_gradients)])
         if not finite(slopes):
             return Status.NON_FINITE.value
-        most = max(abs(sample.objective), float(np.abs(sample.rows).max()), float(slopes.max()))
-        return "" if most <= LARGEST else f"the objective or a slope of it is {most:.2g}, too large to go on with"
+        most = max(float(np.abs(rows).max()), float(slopes.max()))
+        if most > LARGEST_ROW:
+            return f"the objective, a constraint or a slope of theirs is {most:.2g}, too large to go on with"
+        return ""
     return sample.failure
 
 

@@ -344,10 +344,16 @@ def test_a_bound_takes_a_constraint_that_carries_nothing_whatever_it_costs() -> 
 
 @pytest.mark.parametrize("size", [1e160, 1e300])
 @pytest.mark.parametrize("count", [1, 2])
-def test_an_objective_whose_square_is_no_number_fails_with_its_size(size: float, count: int) -> None:
+@pytest.mark.parametrize("limited", [False, True])
+def test_numbers_whose_squares_are_none_end_a_run_with_their_size(size: float, count: int, limited: bool) -> None:
     def functions(x):
         return np.full(count, size * x.sum()), np.full((count, len(x)), size)
 
-    state = ended(Toy(functions, np.full(3, 0.5), 0.0, 1.0))
+    start = np.full(3, 0.5)
+    if limited:
+        problem = Toy(lambda x: (-x[:1], -np.eye(3)[:1]), start, 0.0, 1.0, constraints=functions)
+    else:
+        problem = Toy(functions, start, 0.0, 1.0)
+    state = ended(problem)
     assert state.status is RunStatus.FAILED
     assert f"{1.5 * size:.2g}, too large to go on with" in state.reason

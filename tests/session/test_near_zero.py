@@ -9,8 +9,8 @@ from mdstopo.session import run_session
 from mdstopo.session.near_zero import ADDED, SQUARED, near_zero
 from mdstopo.starts.callbacks import ignore, never
 
-#: a lamp that hangs 1e-11 m beside the vertical below the hook of a hull that goes up and down; what it sways by is hardly
-#: more than rounding
+#: a lamp that hangs 1e-11 m beside the vertical below the hook of a hull that goes up and down; what it sways by is
+#: hardly more than rounding
 LAMP = """
 format: 1
 time: {end: 4}

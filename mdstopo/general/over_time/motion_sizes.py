@@ -8,27 +8,34 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from mdstopo.case.arrays import TimeFormula
+from mdstopo.case.model import GROUND, Signal
 from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.dynamics.members import SCALE
 from mdstopo.general.model.general_model import GROUP, START, STOP
 from mdstopo.general.scene.extent import size_of
+from mdstopo.general.scene.timed_loads import at_ends
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.bodies import distances
+from mdstopo.scene.signal_segments import segment_values, signals_of
 from mdstopo.scene.springs_model import FloatArray
 
 #: below this share of what it may be a response is rounding
 NOUGHT = 1e-12
-#: by the unit of a number of a law: the unit of the size by which it makes a force
-MAKES_FORCE = {"N/m": "stretch", "N s/m": "m/s", "kg": "m/s^2"}
+#: elongations are at least so large, relative to the scene: they are differences of coordinates, whose rounding is this
+#: share of NOUGHT
+LEAST_ELONGATION = 1e-3
+#: by the unit of a number of a law: which size it makes a force of
+MAKES_FORCE = {"N/m": "elongation", "N s/m": "m/s", "kg": "m/s^2"}
 
 
 def motion_sizes(driver: DriverWithRun, count: int) -> dict[str, float]:
-    """The size of what bodies do in a run of `count` steps, by the unit of responses; `stretch`: how far points move.
+    """The size of what bodies do in a run of `count` steps, by the unit of responses; `elongation`: how far points go.
 
-    Velocities and accelerations are those of points within the scene's size of a body, but no less than this size in
-    the whole time: of a scene at rest these are rounding themselves. Forces are those that bodies need which nothing
-    drives, and those that load them.
+    Velocities and accelerations are those of points within the scene's size of a body, and at least the scene's size
+    over the duration: of a scene at rest these are rounding themselves. Forces are mass times acceleration of what
+    nothing drives, and the applied loads. An energy is one of forces over the scene's size, and what springs store.
     """
     bodies, model, size = driver.scene.kinematics, driver.scene.model, size_of(driver.case)
     places = np.column_stack([np.append(np.arange(count), count - 1), np.append(np.zeros(count), 1.0)])
@@ -39,11 +46,13 @@ def motion_sizes(driver: DriverWithRun, count: int) -> dict[str, float]:
     speed, spin = _largest(bodies, v)
     push, twist = _largest(bodies, a)
     needed, needed_moment = _largest(bodies, a * (model.mass * model.free))
-    load, load_moment = _largest(bodies, np.abs(model.force[..., 0]).max(axis=0, keepdims=True) * model.free)
+    load, load_moment = _applied(driver)
     rate = max(spin + speed / size, slow)
     second = max(twist + spin * spin + push / size, slow * slow)
     force = needed + load + (needed_moment + load_moment) / size
-    sizes = {
+    elongation = max(shift + size * turn, LEAST_ELONGATION * size)
+    stored = sum(_of_members(driver, group, {"N/m": elongation**2}) for group in range(len(driver.case.members)))
+    return {
         "m": size,
         "m/s": size * rate,
         "m/s^2": size * second,
@@ -52,13 +61,10 @@ def motion_sizes(driver: DriverWithRun, count: int) -> dict[str, float]:
         "rad/s^2": second,
         "N": force,
         "N m": force * size,
-        "stretch": shift + size * turn,
+        "elongation": elongation,
+        # a rounding of elongations stores a square of it
+        "J": NOUGHT * (stored + force * size),
     }
-    # what a rounding of stretches stores is a square of it
-    groups = range(len(driver.case.members))
-    stored = sum(_of_members(driver, group, {"N/m": sizes["stretch"] ** 2}) for group in groups)
-    sizes["J"] = NOUGHT * (stored + force * size)
-    return sizes
 
 
 def rounding_of(driver: DriverWithRun, j: int, sizes: Mapping[str, float]) -> float:
@@ -81,6 +87,29 @@ def _of_members(driver: DriverWithRun, group: int, sizes: Mapping[str, float]) -
     own = block[block[:, GROUP] == group][:, [START, STOP]].tolist()
     scale = max((float(driver.member_state[SCALE, start:stop].max()) for start, stop in own), default=0.0)
     return scale * sum(abs(value) * sizes[unit] for law in laws for value, unit in law.in_units(tuple(sizes)))
+
+
+def _applied(driver: DriverWithRun) -> tuple[float, float]:
+    """The applied force (N), with weights, and the applied moment (N m): the largest sizes of all loads together."""
+    bodies, model, load_case = driver.scene.kinematics, driver.scene.model, driver.scene.load_case
+    force, moment = _largest(bodies, np.abs(model.force[..., 0]).max(axis=0, keepdims=True) * model.free)
+    inertias = {body.name: float(np.abs(body.inertia).max()) for body in load_case.bodies}
+    for load in load_case.loads:
+        if load.body != GROUND:
+            sizes = [_most(signal, model.times) for signal in signals_of(load)]
+            force += sum(sizes[: len(load.force)])
+            turns = sum(sizes[len(load.force) :])
+            moment += turns * (inertias[load.body] if load.angular_acceleration is not None else 1.0)
+    return force, moment
+
+
+def _most(signal: Signal, times: FloatArray) -> float:
+    """The largest size of a signal at the ends of segments (s), on both sides, and of a formula in their middles."""
+    if isinstance(signal, TimeFormula):
+        halves = np.union1d(times, 0.5 * (times[1:] + times[:-1]))
+        return float(np.abs(at_ends(signal, halves)[..., 0]).max())
+    start, slope = segment_values(signal, times).T
+    return float(np.maximum(np.abs(start), np.abs(start + slope * np.diff(times))).max())
 
 
 def _largest(bodies: Kinematics, changes: FloatArray) -> tuple[float, float]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.over_time.kinks import kinks
-from mdstopo.general.over_time.motion_sizes import NOUGHT, motion_sizes, rounding_of
+from mdstopo.general.over_time.motion_sizes import motion_sizes, rounding_of
 from mdstopo.general.responses.general_responses import has_kinks, switches_of
 from mdstopo.general.steps.run_start import method_number
 from mdstopo.general.steps.step_history import FIRST
@@ -39,10 +39,9 @@ HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
 #: a response that is smaller by this at both ends of a step than in its middle, in this share of all steps, is zero in
 #: truth: joints hold it there, which states keep to and what is between them misses
 MISSED, MOSTLY = 1e-3, 0.75
-#: where inside a step values are compared with those at its ends; and up to how many tolerances, relative to what a
-#: response may be by the motion of the scene, all of them are no more than missed joints where those at the ends are
-#: rounding: in short steps they are no thousand times as large
-INSIDE, BETWEEN = (0.25, 0.5, 0.75), 100.0
+#: at how many places inside a step values are looked at, at least, and in all steps of a run together; where in its
+#: part of a step each is, beside the middle, where much is symmetric
+INSIDE, IN_RUN, BESIDE = 3, 64, 0.4
 
 #: places (K, 2), and between which two ends each is (K,) -> values (K,)
 Integrand = Callable[[FloatArray, IndexArray], FloatArray]
@@ -93,26 +92,36 @@ def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Mapping[
 
 
 def _is_held_at_zero(driver: DriverWithRun, j: int, count: int, nothing: float) -> bool:
-    """Whether response j is zero in all states, and between them but for what is missed there.
+    """Whether response j is zero in all states, and between them but for what is missed there: as far as its size
+    tells, or, of what is never negative, its values at the ends of steps beside those within.
 
-    nothing: up to what size it is rounding; 0: that is not known, and only of what is never negative can values tell.
+    nothing: up to what size it is rounding; 0: that is not known.
     """
     if nothing == 0.0 and not has_kinks(driver.scene.model, j):
         return False
 
-    def size(fraction: float) -> FloatArray:
+    def size(fraction: float, exact: bool = False) -> FloatArray:
         places = np.column_stack([np.arange(count, dtype=np.float64), np.full(count, fraction)])
-        value: FloatArray = driver.sample_response(j, places, False, count, rates=False)[2][:, 0]
+        value: FloatArray = driver.sample_response(j, places, exact, count, rates=False)[2][:, 0]
         return np.abs(value)
 
     ends = np.maximum(size(0.0), size(1.0))
-    if nothing > 0.0 and not np.all(ends <= nothing):
+    is_rounding = nothing > 0.0 and bool(np.all(ends <= nothing))
+    if not (is_rounding or has_kinks(driver.scene.model, j)):
         return False
-    inside = np.array([size(fraction) for fraction in INSIDE])
-    between = nothing * max(1.0, BETWEEN * float(driver.settings[0]) / NOUGHT)
-    if nothing > 0.0 and np.all(inside <= between):
-        return True
-    return bool(np.count_nonzero(ends < MISSED * inside.max(axis=0)) >= MOSTLY * count)
+    places = max(INSIDE, -(-IN_RUN // count))
+    inside = ((np.arange(places) + BESIDE) / places).tolist()
+    between = np.max([size(fraction) for fraction in inside], axis=0)
+    if not (is_rounding or _are_missed(ends, between)):
+        return False
+    # a force that is zero wherever steps end is not zero in the method's own motion within them
+    states = np.maximum(ends, np.max([size(fraction, exact=True) for fraction in inside], axis=0))
+    return (is_rounding and bool(np.all(states <= nothing))) or _are_missed(states, between)
+
+
+def _are_missed(states: FloatArray, between: FloatArray) -> bool:
+    """Whether sizes (S,) in states of steps are next to nothing beside those between the states."""
+    return bool(np.count_nonzero(states < MISSED * between) >= MOSTLY * len(states))
 
 
 def _integrand(driver: DriverWithRun, j: int, t: FloatArray, ends: FloatArray, square: bool) -> Integrand:

@@ -143,7 +143,7 @@ def assemble(ints, floats, q, v, move, phi, rates):
         stated_v = v.copy()
         found = -1
         for _ in range(PROJECTIONS):
-            v[:] = stated_v  # what is nearest to them depends on the place
+            v[:] = stated_v  # not those of the last try: which are nearest depends on the place
             found = project(model, scene_size(model), q, v, workspace, push[0], push[1])
         if model.size[0] > 0 and found < 0:
             _approach(model, scene_size(model), stated, stated_v, q, v, workspace, push)

@@ -34,9 +34,9 @@ from mdstopo.mechanics.laws.law_table import law_is_given, law_unstretched
 #: balances at most; the theta that is small enough to tell tau, the one that is aimed at, and the one from which on it
 #: tells nothing: it cannot be larger than 3, as the motion's size has the change of the accelerations in it
 PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
-#: metres: no motion is larger. A step that is far too long may end at 1e200 m, whose square is no number: relative to
-#: an infinite size every error would be zero, and the step would be kept
-LARGEST = 1e150
+#: what the size of a motion counts as at most (m). A step that is far too long may end at 1e200 m, whose square is no
+#: number: relative to an infinite size every error would be zero, and the step would be kept
+LARGEST_MOTION = 1e150
 
 
 @kernel
@@ -112,11 +112,11 @@ def motion_scale(model, q, rel, rel0, motion, noise, tolerance, scale):
     """
     widest = 0.0
     for p in range(model.pair.shape[0]):
-        scale[p] = min(max(motion[p], deflection(model, rel, rel0, p)), LARGEST)
+        scale[p] = min(max(motion[p], deflection(model, rel, rel0, p)), LARGEST_MOTION)
         widest = max(widest, scale[p])
     for p in range(model.pair.shape[0]):
         lost = noise_of(model, noise, rel, q, p)
-        scale[p] = min(max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost), LARGEST)
+        scale[p] = min(max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost), LARGEST_MOTION)
 
 
 @kernel
