@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from itertools import chain, pairwise
 from pathlib import Path
 
+from mdstopo.shown import counted
+
 Point = tuple[float, ...]
 Layers = dict[str, list[Point]]
 
@@ -21,6 +23,11 @@ DXF_UNITS = {
 }  # fmt: skip
 #: SVG commands of a path and how many numbers each takes; the last two are where it ends
 SVG_COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+POINT = " (the decimal sign is a point)"
+_LENGTH = r"(?:-|[nuµμmcdk]?m|in|inch|inches|ft|feet|yd|mi|px|pt|pixels?|met(?:er|re)s?|millimet(?:er|re)s?)"
+#: a letter with its unit in the name of a column, and a unit that blanks have made a cell of its own
+_WITH_UNIT = re.compile(rf"([xyz])(?:\s*\[{_LENGTH}\]|\s*\({_LENGTH}\)|\s*/\s*{_LENGTH}|[_ ]{_LENGTH})")
+_UNIT_ALONE = re.compile(rf"\[{_LENGTH}\]|\({_LENGTH}\)", re.IGNORECASE)
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 #: an arc of a path: its two flags are one digit each, which the next number may follow at once
 _ARC = r"[\s,]*".join(f"({each})" for each in (*[_NUMBER] * 3, "[01]", "[01]", *[_NUMBER] * 2))
@@ -65,42 +72,93 @@ def _once(points: list[Point]) -> list[Point]:
 
 
 def _csv(data: str, path: Path) -> tuple[Layers, None]:
-    """Columns x, y or x, y, z, with a line of names or without; a column of text before or behind names the layer.
+    """Columns x, y or x, y, z, with a line of names or without; a column of text names the layer.
 
-    Where the line of names has an x and a y, these are the columns; other numbers, as those that count rows, are no
+    Where a line of names has an x and a y, these are the columns; other numbers, as those that count rows, are no
     coordinates.
     """
     layers: Layers = {}
-    columns: list[int] = []
+    names: list[str] = []
     sample = data[:4096]
     delimiter = next((each for each in (";", "\t", ",") if each in sample), " ")
     rows = csv.reader(io.StringIO(data), delimiter=delimiter, skipinitialspace=True)
-    for number, row in enumerate(rows, start=1):
-        cells = [cell.strip() for cell in row if cell.strip()]
-        if not cells or cells[0].startswith("#"):
-            continue
-        words = [cell for cell in cells if not re.fullmatch(_NUMBER, cell)]
-        if len(words) == len(cells) and not layers:
-            columns = _coordinates(row)
-            continue  # names of columns
-        chosen = [row[k].strip() for k in columns if k < len(row)] if columns else cells
-        numbers = [float(cell) for cell in chosen if re.fullmatch(_NUMBER, cell)]
-        if len(numbers) not in (2, 3) or len(words) > 1 or len(numbers) < len(columns):
-            comma = any(re.fullmatch(r"[-+]?\d+,\d+", word) for word in words)
-            hint = " (the decimal sign is a point)" if comma else ""
-            told = f"found {', '.join(cells)}{hint}, allowed are x, y or x, y, z and a name"
-            raise ImportedError(f"{path}, line {number}: {told}")
-        layers.setdefault(words[0] if words else path.stem, []).append(tuple(numbers))
+    try:
+        for number, row in enumerate(rows, start=1):
+            cells = [cell.strip() for cell in row]
+            there = [cell for cell in cells if cell]
+            if not there or there[0].startswith("#"):
+                continue
+            if not layers and not any(map(_is_number, there)):
+                if not _coordinates(names):  # a second line, as one of units, leaves the first
+                    names = [cell for cell in there if not _UNIT_ALONE.fullmatch(cell)] if delimiter == " " else cells
+                continue
+            with mistakes_in(f"{path}, line {number}"):
+                if delimiter in " \t" and len(there) == len([name for name in names if name]) != len(cells):
+                    cells = there  # blanks and tabs that only align
+                named = bool(_coordinates(names))
+                layer, point = _named_point(names, cells, delimiter) if named else _point(names, there)
+            layers.setdefault(layer or path.stem, []).append(point)
+    except csv.Error as error:
+        raise ImportedError(f"{path}, line {rows.line_num}: a cell cannot be read: {error}") from None
     return layers, None
 
 
+def _is_number(cell: str) -> bool:
+    return re.fullmatch(_NUMBER, cell) is not None
+
+
+def _decimal(cells: list[str]) -> str:
+    """What is said of numbers with a decimal comma, empty where there is none."""
+    return POINT if any(re.fullmatch(r"[-+]?\d+,\d+", cell) for cell in cells) else ""
+
+
+def _named_point(names: list[str], cells: list[str], delimiter: str) -> tuple[str, Point]:
+    """The layer (empty: none) and the coordinates in the columns that names call x, y and perhaps z."""
+    columns = _coordinates(names)
+    filled = max(k for k, cell in enumerate(cells, start=1) if cell)
+    last = len(names) - 1  # may be a remark with separators in it
+    more = filled > len(names) and (last in columns or not cells[last] or _is_number(cells[last]))
+    if more or (delimiter == " " and filled < len(names)):
+        hint = POINT if delimiter == "," and re.search(r"\d,\d", ",".join(cells)) else ""
+        told = f"found {delimiter.join(cells)}{hint}, which has {counted(filled, 'cell')}"
+        raise ValueError(f"{told}; the line of names has {len(names)}")
+    for column in columns:
+        cell = cells[column] if column < len(cells) else ""
+        if not _is_number(cell):
+            told = f"found {cell or 'nothing'}{_decimal([cell])} in column {names[column]}"
+            raise ValueError(f"{told}, allowed is a number")
+    texts = {k: cell for k, cell in enumerate(cells) if cell and k not in columns and not _is_number(cell)}
+    titles = [name.lower() for name in names]
+    layer = texts.get(titles.index("layer")) if "layer" in titles else None
+    return layer or next(iter(texts.values()), ""), tuple(float(cells[k]) for k in columns)
+
+
+def _point(names: list[str], cells: list[str]) -> tuple[str, Point]:
+    """The layer (empty: none) and all numbers of a row, in order: columns have no names, or others than x and y."""
+    words = [cell for cell in cells if not _is_number(cell)]
+    numbers = tuple(float(cell) for cell in cells if _is_number(cell))
+    if len(numbers) not in (2, 3) or len(words) > 1:
+        raise ValueError(f"found {', '.join(cells)}{_decimal(cells)}, allowed are x, y or x, y, z and a name")
+    if len(numbers) == 3 and len(names) == len(cells):
+        told = (
+            f"found {', '.join(cells)} in columns called {', '.join(names)}, which may be x, y, z or a number and x, y"
+        )
+        raise ValueError(f"{told}: call the coordinates x, y and z")
+    return words[0] if words else "", numbers
+
+
 def _coordinates(names: list[str]) -> list[int]:
-    """The places of x, y and perhaps z among names of columns such as `x`, `x_mm` or `X [m]`; empty without x and y."""
+    """The places of x, y and perhaps z among names of columns; empty without x and y.
+
+    These are `x`, else the letter with a unit of length, such as `x_mm`, `x/mm` or `X [m]`; `x_std` is none.
+    """
+    titles = [name.lower() for name in names]
     found: dict[str, int] = {}
-    for place, name in enumerate(names):
-        letter = re.fullmatch(r"([xyz])(?:[ _\[(].*)?", name.strip().lower())
+    for place, title in enumerate(titles):
+        letter = _WITH_UNIT.fullmatch(title)
         if letter is not None:
             found.setdefault(letter[1], place)
+    found |= {axis: titles.index(axis) for axis in "xyz" if axis in titles}
     return [found[axis] for axis in "xyz" if axis in found] if {"x", "y"} <= set(found) else []
 
 

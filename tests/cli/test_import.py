@@ -105,12 +105,40 @@ def test_tables_are_points_with_names_or_without() -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "text", "layers"),
+    [
+        ("a.csv", "nr,x,y\n-,mm,mm\n1,5,6\n", {"a": [(5, 6)]}),
+        ("a.csv", "x_std,y_std,x,y\n.1,.2,5,6\n", {"a": [(5, 6)]}),
+        ("a.csv", "x_std,y_std,x_mm,y_mm\n.1,.2,5,6\n", {"a": [(5, 6)]}),
+        ("a.csv", "id,x,y,z_order\n1,5,6,7\n", {"a": [(5, 6)]}),
+        ("a.csv", "nr,X/mm,Y (mm)\n1,5,6\n", {"a": [(5, 6)]}),
+        ("a.csv", "name,x,y,comment\nrim,5,6,new\nhub,7,8,\n", {"rim": [(5, 6)], "hub": [(7, 8)]}),
+        ("a.csv", "x,y,comment,layer\n5,6,new,rim\n", {"rim": [(5, 6)]}),
+        ("a.csv", "layer,x,y,comment\nrim,5,6,new, and round\n", {"rim": [(5, 6)]}),
+        ("a.txt", "x [m] y [m]\n1 2\n", {"a": [(1, 2)]}),
+        ("a.txt", "nr x [m] y [m]\n1 5 6\n", {"a": [(5, 6)]}),
+        ("a.txt", "x\ty\n1\t\t2\n", {"a": [(1, 2)]}),
+        ("a.csv", "east,north\n5,6\n", {"a": [(5, 6)]}),
+        ("a.csv", "Points of the rim\n5,6,7\n", {"a": [(5, 6, 7)]}),
+    ],
+)
+def test_the_line_of_names_says_which_columns_are_coordinates(name: str, text: str, layers: dict[str, Any]) -> None:
+    assert points_in(Path(name), text)[0] == layers
+
+
+@pytest.mark.parametrize(
     ("name", "text", "words"),
     [
         ("a.csv", "1,2\n1,2,3,4\n", "line 2: found 1, 2, 3, 4"),
         ("a.csv", "x,y\n", "there are no points"),
-        ("a.csv", "x;y\n1,5;2\n", r"line 2: found 1,5, 2 \(the decimal sign is a point\)"),
-        ("a.csv", "x,y,nr\n1,,2\n", "line 2: found 1, 2, allowed are"),
+        ("a.csv", "x;y\n1,5;2\n", r"line 2: found 1,5 \(the decimal sign is a point\) in column x, allowed is a n"),
+        ("a.csv", "x,y,nr\n1,,2\n", "line 2: found nothing in column y, allowed is a number"),
+        ("a.csv", "x,y,z\n1,2,\n", "line 2: found nothing in column z, allowed is a number"),
+        ("a.csv", "x,y\n1,5,2,5\n", r"found 1,5,2,5 \(the decimal sign is a point\), which has 4 cells; .* has 2"),
+        ("a.csv", "x;y\n7;1;2\n", "line 2: found 7;1;2, which has 3 cells; the line of names has 2"),
+        ("a.txt", "x y nr\n5 6 1\n6 2\n", "line 3: found 6 2, which has 2 cells; the line of names has 3"),
+        ("a.csv", "nr,east,north\n1,5,6\n", "line 2: found 1, 5, 6 in columns called nr, east, north, which may be"),
+        ("a.csv", f'x,y,note\n1,2,"{"a" * 140000}"\n', "line 2: a cell cannot be read: field larger than"),
         ("a.dxf", "hello\nworld\n", "this is no DXF"),
         ("a.svg", "<svg", "this is no SVG"),
         ("a.svg", '<svg><g id="k" transform="scale(2)"><line/></g></svg>', "'k' has a transform"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -169,22 +170,102 @@ def test_empty_cells_at_the_end_of_rows_are_no_columns(folder: Path) -> None:
     assert table(folder, text, time="t", value="y") == [1.0, 2.0, 3.0, 4.0, 5.0]
 
 
+VALUES = [1.0, 2.0, 3.0, 4.0, 5.0]
+DECIMAL = "numbers have a point, not a comma"
+
+
+def rows_of(head: str, row: str) -> str:
+    """A header line over five rows at the times 0.01 to 0.05 with the values 1 to 5."""
+    return head + "\n" * bool(head) + "".join(row.format(i=i) + "\n" for i in range(1, 6))
+
+
 @pytest.mark.parametrize(
-    ("head", "row", "told"),
+    ("head", "row", "columns"),
     [
-        ("t,y", "0,0{i},1,5", "the row has 4 cells, the header line has 2; numbers have a point, not a comma"),
-        ("", "0,0{i},1,5", ""),
-        ("t, s,y,z", "0.0{i},1,5", "the row has 3 cells, the header line has 4; commas between columns say"),
-        ("t y z", "0.0{i} 1", "the row has 2 cells, the header line has 3; commas between columns say"),
+        ("time\ty", "0.0{i}\t\t{i}", ("time", "y")),  # several tabs are one gap
+        ("time\ty", "0.0{i}\t\t{i}", (0, 1)),
+        ("t s\tforce N", "0.0{i}\t\t{i}", ("t s", "force N")),
+        ("t\ty\tz", "0.0{i}\t\t{i}", ("t", "z")),  # here they are an empty cell
+        ("\tt\ty", "{i}\t0.0{i}\t{i}", ("t", "y")),  # an index in front
+        ("t\ty\ttemp\tnote", '\t{i}\t0.0{i}\t"q"', ("temp", "y")),
+        ("t s\tF N", "0.0{i} {i}", ("t s", "F N")),
+        ("t,y", "0.0{i} {i}", ("t", "y")),
+        ("t [s]  F [N]", "0.0{i} {i}", (0, 1)),
+        ("t [s]  F [N]", "0.0{i} {i}", ("t [s]", "F [N]")),
+        ("Zeit, s;Kraft, N", "0.0{i};{i}", ("Zeit, s", "Kraft, N")),
+        ("time, s\tforce, N", "0.0{i}\t{i}", ("time, s", "force, N")),
+        ("t, s,y,z", "0.0{i},{i},5", (0, 1)),
+        ("drop of a block", "0.0{i},{i}", (0, 1)),
+        ("t,y", "0.0{i},{i} # first", ("t", "y")),
+        ("t y", "0.0{i} {i} #first", ("t", "y")),
+        ("t #1,y #2", "0.0{i},{i}", ('"t #1"', '"y #2"')),
+        ("t,y,note\n0,7,", '0.0{i},{i},"a # b, c"', ("t", "y")),
     ],
 )
-def test_rows_with_other_cells_than_columns_are_refused(folder: Path, head: str, row: str, told: str) -> None:
-    """A decimal comma, a comma in a name, a gap between blanks: the value was taken from another column."""
-    if not told:  # without a header line the first row says how many there are
-        head, told = "0.01,1", "line 2: the row has 4 cells, the first row has 2; numbers have a point"
-    text = head + "\n" + "".join(row.format(i=i) + "\n" for i in range(2, 7))
-    columns = {"time": 0, "value": 1}
-    assert any(told in each for each in read(folder, text, **columns))
+def test_what_separates_the_rows_separates_the_names(
+    folder: Path, head: str, row: str, columns: tuple[str | int, str | int]
+) -> None:
+    found = table(folder, rows_of(head, row), time=columns[0], value=columns[1])
+    assert found[-5:] == VALUES
+
+
+@pytest.mark.parametrize("columns", [("t", "y"), (0, 1)])
+@pytest.mark.parametrize(
+    ("head", "row", "remark"),
+    [
+        ("t,y,note", "0.0{i},{i},", "down, and up"),
+        ("t;y;note", "0.0{i};{i};", "down; and up"),
+        ("t y note", "0.0{i} {i}", "down"),
+        ("t y note", "0.0{i} {i} down", " and up"),
+    ],
+)
+def test_remarks_behind_the_columns_that_are_read_need_no_quotation_marks(
+    folder: Path, head: str, row: str, remark: str, columns: tuple[str | int, str | int]
+) -> None:
+    first, *rows = rows_of(head, row).splitlines()
+    blank = "" if row.endswith((",", ";")) else " "
+    rows[2] += blank * (not remark.startswith(" ")) + remark
+    assert table(folder, "\n".join([first, *rows]), time=columns[0], value=columns[1]) == VALUES
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "columns", "told"),
+    [
+        ("t,y", "0,0{i},1,5", (0, 1), f"line 2: the row has 4 cells, the header line has 2; columns are taken to stand "
+         f"between commas, and {DECIMAL}"),
+        ("t,y", "0,0{i},1,5", ("t", "y"), "line 2: the row has 4 cells, the header line has 2"),
+        ("t,y,note", "0,0{i},1,5", ("t", "y"), "line 2: the row has 4 cells, the header line has 3"),
+        ("t,y,note", "0,0{i},1,5,a", (0, 1), "line 2: the row has 5 cells, the header line has 3"),
+        ("t\ty", "0,0{i}\t{i},5", ("t", "y"), "line 2: found '0,01', allowed is a finite number (column t); numbers "
+         "have a point, not a comma"),
+        ("0.01,1", "0,0{i},1,5", (0, 1), "line 2: the row has 4 cells, the first row has 2"),
+        ("t, s,y,z", "0.0{i},{i},5", ("t", "y"), "the row has 3 cells, the header line has 4; columns are taken to "
+         "stand between commas; names with commas stand in quotation marks"),
+        ("t y z", "0.0{i} 1", ("t", "y"), "line 2: the row has 2 cells, the header line has 3; columns are taken to "
+         "stand between blanks; commas between columns say which is empty"),
+        ("0,01,1,5", "{i},1,5", (0, 1), "line 2: the row has 3 cells, the first row has 4; columns are taken to stand "
+         f"between commas, and {DECIMAL}"),
+        ("0 1 2", "0.0{i} 1", (0, 1), "line 2: the row has 2 cells, the first row has 3"),
+        ("t y note\n0 1 5", "0.0{i} 1", ("t", "y"), "line 3: the row has 2 cells, the header line has 3"),
+        ("t", "0.0{i} 1", ("t", 1), "line 2: the row has 2 cells, the header line has 1; columns are taken to stand"),
+        ("y z", "1", ("y", "z"), "line 2: the row has 1 cell, the header line has 2"),
+        ("t\ty", "{i}\t0.0{i}\t1", ("t", "y"), "the row has 3 cells, the header line has 2; columns are taken to "
+         "stand between tabs"),
+        ("t,y,note,z", "{i},0.0{i},5,hit,7", ("t", "y"), "the row has 5 cells, the header line has 4"),
+        ("t y note", "{i} 0.0{i} 5 hit", ("t", "y"), "the row has 4 cells, the header line has 3; columns are"),
+        ("t\ty\tz s", "{i}\t0.0{i}\t5\t7", ("t", "y"), "the row has 4 cells, the header line has 3"),
+        ("t,y\n0,1\n0.01", "0.0{i},1", ("t", "y"), "line 3: found nothing, allowed is a finite number (column y)"),
+        ("t,y,note\n0,1,a", '0.0{i},1,"' + "a" * 140000 + '"', ("t", "y"),
+         "line 3: a cell in quotation marks cannot be read: field larger than field limit (131072)"),
+    ],
+)  # fmt: skip
+def test_rows_with_other_cells_than_columns_are_refused(
+    folder: Path, head: str, row: str, columns: tuple[str | int, str | int], told: str
+) -> None:
+    """Decimal commas, commas in names, gaps between blanks, numbers of rows: nobody knows which cell is which."""
+    found = read(folder, rows_of(head, row), time=columns[0], value=columns[1])
+    assert any(told in each for each in found), found
+    assert all(DECIMAL not in each for each in found) or re.search(r"\d,\d", row.format(i=1))
 
 
 def test_a_name_that_two_columns_have_is_refused(folder: Path) -> None:
