@@ -53,7 +53,7 @@ _compiled: OrderedDict[int, Evaluator] = OrderedDict()
 
 def _evaluator(case: Case) -> Evaluator:
     """The case's evaluator, made at its first use. Raises CaseError where the engine cannot compute the case."""
-    key = id(_is_case(case))
+    key = id(_checked_case(case))
     found = _compiled.get(key)
     if found is None:
         found = _compiled[key] = evaluator_of(case)
@@ -64,7 +64,7 @@ def _evaluator(case: Case) -> Evaluator:
     return found
 
 
-def _is_case(case: object) -> Case:
+def _checked_case(case: object) -> Case:
     """What is to be a case, if it is one. Raises TypeError."""
     if not isinstance(case, Case):
         what = f"{type(case).__name__} {case!r:.60}" if isinstance(case, (str, Path)) else type(case).__name__
@@ -72,11 +72,17 @@ def _is_case(case: object) -> Case:
     return case
 
 
+def as_real(values: ArrayLike, what: str) -> FloatArray:
+    """A new array of real numbers; what: they are called in a message. Raises ValueError for complex ones."""
+    if np.iscomplexobj(values):
+        # conversion would drop the imaginary part, and with it derivatives by complex steps
+        raise ValueError(f"{what} must be real, not complex; exact derivatives come with the values")
+    return np.array(values, dtype=np.float64)
+
+
 def _design(case: Case, alpha: ArrayLike | None, variables: Mapping[str, ArrayLike] | None) -> FloatArray:
     """alpha (N,) with the values of variables (P,) behind it."""
-    if alpha is not None and np.iscomplexobj(alpha):
-        raise ValueError("alpha must be real, not complex; Evaluation.gradients has the exact derivatives")
-    given = case.initial if alpha is None else np.asarray(alpha, dtype=np.float64)
+    given = case.initial if alpha is None else as_real(alpha, "alpha")
     if not variables and not case.variables:
         return given
     parts = case.space.parts
@@ -86,7 +92,7 @@ def _design(case: Case, alpha: ArrayLike | None, variables: Mapping[str, ArrayLi
         raise ValueError(f"no design variable {unknown[0]!r}; {there}")
     design = np.array(case.whole(given))
     for name, values in (variables or {}).items():
-        own, count = np.asarray(values, dtype=np.float64), parts[name].stop - parts[name].start
+        own, count = as_real(values, name), parts[name].stop - parts[name].start
         if own.shape not in ((), (count,)):
             raise ValueError(f"{name} has {count} values, not {own.shape}")
         design[parts[name]] = own
@@ -107,7 +113,7 @@ def simulate(
     A motion that cannot go on ends early, and says so in `Trajectory.status`.
     Raises CaseError where the case asks for what the engine cannot do, ValueError for an unusable alpha.
     """
-    names = [each.name for each in _is_case(case).load_cases]
+    names = [each.name for each in _checked_case(case).load_cases]
     if load_case is None:
         if len(names) > 1:
             raise ValueError(f"the case has several load cases, name one of them: {', '.join(names)}")
@@ -178,7 +184,7 @@ def optimize(
     from mdstopo.session.run_session import run_session
 
     return run_session(
-        _is_case(case),
+        _checked_case(case),
         path=path,
         resume=resume,
         overwrite=overwrite,

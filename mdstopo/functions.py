@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mdstopo.api import evaluate
+from mdstopo.api import as_real, evaluate
 from mdstopo.case.model import Case, FloatArray
 from mdstopo.evaluation import Evaluation
 
@@ -45,7 +45,7 @@ class Responses:
 
     def at(self, x: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """The values (m,) of objectives and constraints and their derivatives (m, n), at x (n,)."""
-        asked = np.array(x, dtype=np.float64)
+        asked = as_real(x, "x")
         if self._last is None or not np.array_equal(self._last[0], asked):
             alpha, values = asked[: self.case.n_design], self.case.space.named(asked)
             found = evaluate(self.case, alpha, variables=values, method=self._method)

@@ -54,12 +54,9 @@ def load_case(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None 
 
     path: of the file; the bare name of a case that comes with the package will do, with or without `.yaml`, where there
     is no such file. overrides: key path -> value, as the command line's ``--set KEY=VALUE``; text is read as YAML.
-    Raises CaseError with every mistake that one reading finds.
+    Raises CaseError with every mistake that one reading finds, TypeError for overrides that are no mapping.
     """
-    stated: object = overrides
-    if stated is not None and not isinstance(stated, Mapping):
-        found = type(stated).__name__
-        raise TypeError(f"overrides: found {found}, needed is a mapping, such as {{'solver.tolerance': 1e-9}}")
+    overrides = _checked_overrides(overrides)
     place = case_file(Path(path))
     try:
         text, digest = text_in(place)
@@ -104,6 +101,7 @@ class Document:
         overrides: Mapping[str, Any] | None = None,
         sha256: str | None = None,
     ) -> None:
+        overrides = _checked_overrides(overrides)
         self._place = None if path is None else Path(path)
         self._file = "<text>" if path is None else str(path)
         self._sha256 = sha256 or hashlib.sha256(text.encode(errors="replace")).hexdigest()
@@ -114,7 +112,7 @@ class Document:
         except CannotExtendError:
             raise CaseError(reading.mistakes, self._file) from None
         self._text = text if root is own else text_of_tree(root)
-        root, self._overrides = apply_overrides(root, overrides or {}, reading.mistakes.append)
+        root, self._overrides = apply_overrides(root, overrides, reading.mistakes.append)
         if KEY in root.entries:
             reading.mistake(KEY, "can only be stated in the file", root.entries[KEY][1])
         #: with expressions, and with numbers in their places
@@ -165,6 +163,16 @@ class Document:
             **parts,
         )
         return with_start_set(case) if case.priced_groups else case
+
+
+def _checked_overrides(overrides: object) -> Mapping[str, Any]:
+    """What is to be overrides, if it is a mapping; an empty one for None. Raises TypeError."""
+    if overrides is None:
+        return {}
+    if not isinstance(overrides, Mapping):
+        kind = type(overrides).__name__
+        raise TypeError(f"overrides: found {kind}, needed is a mapping, such as {{'solver.tolerance': 1e-9}}")
+    return overrides
 
 
 def measured(root: Node) -> dict[str, float]:

@@ -102,6 +102,8 @@ def robot_in(path: Path, data: str, fixed: bool = False) -> tuple[Plain, list[st
     if not tree.bodies:
         raise ImportedError(f"{path}: no body in it has a mass")
     for name, part in tree.bodies.items():
+        if not (np.isfinite(part.mass) and np.isfinite(part.inertia).all()):
+            raise ImportedError(f"{path}: body {name!r}: its mass or its inertia is no number")
         least = float(np.linalg.eigvalsh(part.inertia).min())
         if part.mass < 0.0 or least < -1e-9 * np.abs(part.inertia).max():  # beyond rounding of turned parts
             found = f"the mass {part.mass:g} kg and the least moment of inertia {least:g} kg m^2"

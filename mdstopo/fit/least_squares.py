@@ -189,12 +189,12 @@ def minimum(
             raise StoppedError
         evaluations += 1
         trouble, misfit = problem.misfit(whole(u))
+        trouble = trouble or _too_large(problem, misfit, deviation)
         if trouble and evaluations == 1:
             raise MotionError(trouble)
-        if evaluations == 1 and (too_large := _too_large(problem, misfit, deviation)):
-            raise MotionError(too_large)
-        if not trouble:
-            seen(Evaluated(whole(u), misfit, deviation))
+        if trouble:
+            return np.full_like(misfit, np.inf)  # the step is taken for too long, and a shorter one is tried
+        seen(Evaluated(whole(u), misfit, deviation))
         return misfit / deviation
 
     def jacobian(u: FloatArray) -> FloatArray:

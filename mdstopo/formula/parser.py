@@ -66,9 +66,12 @@ class Formula(NamedTuple):
         return self.columns.get(part, 1)
 
 
-def parse(text: str, names: Collection[str] | None = None) -> Formula:
-    """The formula in a text. names: those that it may use; None: any. Raises FormulaError with the column."""
-    return _Parser(text, names).formula()
+def parse(text: str, names: Collection[str] | None = None, hints: Mapping[str, str] | None = None) -> Formula:
+    """The formula in a text. Raises FormulaError with the column.
+
+    names: those that it may use; None: any. hints: what is told beside, by names that may be written and are unknown.
+    """
+    return _Parser(text, names, hints or {}).formula()
 
 
 def reserved(word: str) -> bool:
@@ -101,9 +104,10 @@ def _tokens(text: str) -> list[Token]:
 
 
 class _Parser:
-    def __init__(self, text: str, names: Collection[str] | None) -> None:
+    def __init__(self, text: str, names: Collection[str] | None, hints: Mapping[str, str]) -> None:
         self.text = text
         self.names = names
+        self.hints = hints
         self.tokens = _tokens(text)
         self.place = 0
         self.depth = 0
@@ -191,7 +195,7 @@ class _Parser:
         if word in FUNCTIONS:
             raise FormulaError(f"{word!r} is a function and is written {word}(...)", token.column)
         if self.names is not None and word not in self.names:
-            raise FormulaError(_unknown(word, self.names), token.column)
+            raise FormulaError(_unknown(word, self.names, self.hints.get(word)), token.column)
         return self.kept(token, name(word))
 
     def call(self, token: Token) -> Expression:
@@ -266,14 +270,12 @@ class _Parser:
         return FormulaError(f"found {what}, allowed is {allowed}", token.column)
 
 
-def _unknown(word: str, names: Iterable[str]) -> str:
+def _unknown(word: str, names: Iterable[str], more: str | None) -> str:
     listed = sorted(names)
     hint = _did_you_mean(word, [*listed, *FUNCTIONS, *CONSTANTS])
     told = ", ".join(listed[:20]) + (", ..." if len(listed) > 20 else "")
     there = f"names are {told}" if listed else "no names are defined"
-    if word == TIME:
-        there += "; a formula of time has no leading ="
-    return f"there is no name {_shown(word)}{hint or ';'} {there}"
+    return f"there is no name {_shown(word)}{hint or ';'} {there}" + (f"; {more}" if more else "")
 
 
 def _did_you_mean(word: str, words: Iterable[str]) -> str:

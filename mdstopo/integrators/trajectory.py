@@ -1,7 +1,8 @@
 """The motion of a scene as the user sees it: steps, and any time between them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,9 +61,17 @@ class Trajectory:
         return html_of(self)
 
     def __getstate__(self) -> dict[str, object]:
-        """What a copy has, also in another process: the states at the steps. What computes those between them is
-        compiled for this process."""
+        """What is pickled: the states at the steps. What computes those between them is compiled for this process."""
         return {**self.__dict__, "steps": None, "border": None}
+
+    def __copy__(self) -> "Trajectory":
+        """A copy in this process, which has all there is."""
+        return replace(self)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "Trajectory":
+        """The same with arrays of its own; it shares what computes states between the steps, which nothing changes."""
+        shared = ("steps", "border")
+        return replace(self, **{key: deepcopy(value, memo) for key, value in vars(self).items() if key not in shared})
 
     @classmethod
     def of(
@@ -97,11 +106,11 @@ class Trajectory:
     def at(self, times: ArrayLike) -> States:
         """States at times (T,), from the integrator's own dense output.
 
-        Raises ValueError where a time lies outside what was simulated, and of a copy of a trajectory, as pickling
-        makes one, which has the states at its steps alone.
+        Raises ValueError where a time lies outside what was simulated, and of a trajectory that was pickled, which has
+        the states at its steps alone.
         """
         if self.border is None:
-            raise ValueError("a copy of a trajectory has the states at its steps (t, q, v, a), none between them")
+            raise ValueError("a pickled trajectory has the states at its steps (t, q, v, a), none between them")
         asked = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if asked.ndim != 1 or not np.all((asked >= self.t[0]) & (asked <= self.t[-1])):
             raise ValueError(f"times must be one-dimensional and lie within {self.t[0]:g} .. {self.t[-1]:g} s")

@@ -12,13 +12,11 @@ from mdstopo.plots.scenery import start_state
 from mdstopo.plots.slack import member_lines
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.stage import Stage
-from mdstopo.plots.style import WIDTH, ink
+from mdstopo.plots.style import WIDTH, difference, ink
 from mdstopo.plots.thickness import FAINT, Thickness, alike, thickness
 
 #: of the largest: a difference that is drawn
 LEAST = 0.05
-#: the colour of what there is more of: none that a group of members has
-MORE = "#1a1a1a"
 #: inches: how high a drawing is at most
 HIGHEST = 2.5
 
@@ -96,4 +94,4 @@ def _more(axis: Any, stage: Stage, thick: Thickness, every: Floats, inches: Floa
         is_more = rise[some] > LEAST
         add_lines(axis, lines[~is_more], side[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
         widths = NARROWEST + widest * rise[some][is_more]
-        add_lines(axis, lines[is_more], side[is_more], widest, colors=MORE, linewidths=widths, zorder=2.4)
+        add_lines(axis, lines[is_more], side[is_more], widest, colors=difference(), linewidths=widths, zorder=2.4)

@@ -73,6 +73,11 @@ def ink(strength: str = "full") -> str:
     return {"full": _INK, "middle": _MIDDLE, "faint": "#5a5d64"}[strength] if is_dark() else light[strength]
 
 
+def difference() -> str:
+    """The colour of what differs between two designs: none that a group, a body or ink has."""
+    return "#B13CFF" if is_dark() else "#7A00C8"
+
+
 def paper() -> str:
     """The colour of the background."""
     return _PAPER if is_dark() else "#FFFFFF"

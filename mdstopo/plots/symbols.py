@@ -93,11 +93,13 @@ def _motions(case: Case, chosen: LoadCase) -> Iterator[Symbol]:
 
 
 def _sense(own: Prescribed, rate: float, chosen: LoadCase) -> float:
-    """1 or -1, the way in which a coordinate is driven: the sign of the acceleration or velocity where it is largest,
-    of the position where it is farthest from its first, or of the rate at the start where there is no acceleration."""
+    """1 or -1, the sign of what is prescribed of a coordinate, within the load case: of an acceleration or a velocity
+    where it is largest, of a position less its first where that is largest, and of the rate at the start where the
+    acceleration is 0. The same braking points backwards as an acceleration and forwards as a velocity."""
     signal, span = own.signal, (chosen.start, chosen.end)
     first = _value(signal, chosen.start) if own.kind == "position" else 0.0
-    values = np.array([_value(signal, t) for t in _times((signal,), span)]) - first
+    inner = [t for t in _times((signal,), span) if chosen.start < t < chosen.end]
+    values = np.array([_value(signal, t) for t in (chosen.start, *inner, chosen.end)]) - first
     largest = float(values[np.abs(values).argmax()])
     return float(np.copysign(1.0, largest or rate))
 

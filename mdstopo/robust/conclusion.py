@@ -26,8 +26,8 @@ class Robust:
 
     name: of the objective, or `constraints[i]`. measure: in words. nominal: the value of the case as it is written.
     value: the measure over the design's sample. check: the measure over the fresh sample, None without one. worse:
-    share of that sample which is worse than `value`. kept: share of it that keeps the constraint; None for objectives.
-    sign: 1 where larger is worse, else -1.
+    share of that sample which is worse than `value` by more than the rounding of sums, 1e-12 of it. kept: share of it
+    that keeps the constraint; None for objectives. sign: 1 where larger is worse, else -1.
     """
 
     name: str
@@ -96,20 +96,32 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, workers: Po
         values = np.array([trial.objectives[j] for trial in usable])
         results.append(
             _robust(
-                objective.name, objective, measure, nominal.objectives[objective.name],
-                found.objectives[objective.name], objectives[:, j], values if enough else None, sample, 0.0,
+                objective.name,
+                objective,
+                measure,
+                nominal=nominal.objectives[objective.name],
+                value=found.objectives[objective.name],
+                values=objectives[:, j],
+                fresh=values if enough else None,
+                sample=sample,
             )
-        )  # fmt: skip
+        )
     for i, row in rows.items():
         values = np.array([trial.responses[i] for trial in usable]) + row.bound
         measure, here = engine.uncertainty.constraints[i], responses[:, i] + row.bound
         results.append(
             _robust(
-                f"constraints[{i}]", row, measure, float(nominal.constraints[i]) + row.bound,
-                float(found.constraints[i]) + row.bound, here, values if enough else None, sample,
-                case.optimizer.tolerance * (abs(row.bound) or 1.0),
+                f"constraints[{i}]",
+                row,
+                measure,
+                nominal=float(nominal.constraints[i]) + row.bound,
+                value=float(found.constraints[i]) + row.bound,
+                values=here,
+                fresh=values if enough else None,
+                sample=sample,
+                tolerance=case.optimizer.tolerance * (abs(row.bound) or 1.0),
             )
-        )  # fmt: skip
+        )
     warnings += tuple(_fitted(case, each) for each in results if each.is_fitted)
     part = _part(case, sample, objectives, responses, results)
     if fresh is not None:
@@ -127,12 +139,13 @@ def _robust(
     name: str,
     of: Objective | ResponseRow,
     measure: Measure,
+    *,
     nominal: float,
     value: float,
     values: FloatArray,
     fresh: FloatArray | None,
     sample: Sample,
-    tolerance: float,
+    tolerance: float = 0.0,
 ) -> Robust:
     """What an objective or a constraint comes to over the sample, and what a fresh sample says of that.
 

@@ -180,11 +180,21 @@ class SizeSearch:
 
     # -- the search
 
-    def run(self, stop: Callable[[], bool], keep: Callable[[SearchProgress], None]) -> SearchProgress:
-        """Search on until nothing is left, or stop() says so; keep sees what has been found after each node."""
+    def run(
+        self,
+        stop: Callable[[], bool],
+        keep: Callable[[SearchProgress], None],
+        seen: Callable[[SearchProgress], None] = lambda _: None,
+    ) -> SearchProgress:
+        """Search on until nothing is left, or stop() says so.
+
+        stop: asked between evaluations.
+        keep: is given what has been found after each node.
+        seen: is given it after each node and after each choice that is tried where there are no nodes.
+        """
         progress = self.progress
         if self._catalogued.choices <= FEW and not len(self._others):
-            self._try_all(stop)
+            self._try_all(stop, seen)
         while self._open and not progress.exhaustive and not stop() and self._counts[0] < MOST_EVALUATIONS:
             node = heapq.heappop(self._open)
             if node.bound < self._cutoff():
@@ -192,8 +202,9 @@ class SizeSearch:
                 progress.nodes += 1
             self._update()
             keep(progress)
+            seen(progress)
         if not self._open and not progress.exhaustive and not self._refined:
-            self._refined = self._refine(stop)
+            self._refined = self._refine(stop, seen)
         self._update()
         keep(progress)
         return progress
@@ -208,12 +219,14 @@ class SizeSearch:
         best = self.progress.objective
         return best - self._tolerance * abs(best) if np.isfinite(best) else best
 
-    def _try_all(self, stop: Callable[[], bool]) -> None:
+    def _try_all(self, stop: Callable[[], bool], seen: Callable[[SearchProgress], None]) -> None:
         ranges = [range(len(sizes)) for sizes in self._catalogued.sizes]
         for choice in product(*ranges):
             if stop():
                 return
             self._try(np.array(choice, dtype=np.int64), self._start)
+            self._update()
+            seen(self.progress)
         self._open = []
         self.progress.exhaustive = True
 
@@ -392,7 +405,7 @@ class SizeSearch:
         self.progress.choice, self.progress.x, self.progress.objective = choice.copy(), there, float(value)
         return True
 
-    def _refine(self, stop: Callable[[], bool]) -> bool:
+    def _refine(self, stop: Callable[[], bool], seen: Callable[[SearchProgress], None]) -> bool:
         """Go downhill from the best choices that were met, to better neighbours; whether it came to its end."""
         if self._beginnings is None:
             usable = [(value, key) for key, value in self._known.items() if np.isfinite(value)]
@@ -407,6 +420,8 @@ class SizeSearch:
                         return False
                     start = self._start if self.progress.x is None else self.progress.x
                     self.progress.exchanged |= self._try(choice, start)
+                    self._update()
+                    seen(self.progress)
                     there = self._known.get(tuple(choice.tolist()), float("inf"))
                     if there < least:
                         at, least, improved = choice, there, True

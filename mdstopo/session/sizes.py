@@ -113,16 +113,18 @@ class Sizes:
         said_at = time.monotonic()
 
         def save(progress: SearchProgress) -> None:
-            nonlocal said_at
             self.outcome = self._outcome(progress, catalogued)
             keep()
+
+        def say(progress: SearchProgress) -> None:
+            nonlocal said_at
             if time.monotonic() - said_at >= SAID_EVERY:
                 said_at = time.monotonic()
                 objective = f"{self._sign * progress.objective:.6g}"
                 best = "no choice yet" if progress.x is None else f"best choice {objective}"
                 notify(f"choosing sizes: {progress.nodes:,} nodes, {progress.evaluations:,} evaluations, {best}")
 
-        progress = search.run(stop, save)
+        progress = search.run(stop, save, say)
         self.outcome = self._outcome(progress, catalogued)
         if (not progress.finished and stop()) or progress.x is None:
             return state
@@ -158,7 +160,10 @@ class Sizes:
         if ended and not self.outcome.sizes:
             what = "keeps the constraints" if self.outcome.finished else f"was found in {self.outcome.nodes} nodes"
             if not self.outcome.members:
-                what += ": no member has at least half of its least size, and all others are left out"
+                what += (
+                    ": no member is kept (none reaches half of its least size above 0), "
+                    "and all members at their least sizes do not keep the constraints"
+                )
             return RunStatus.FAILED, f"no choice of sizes {what}; the design is the continuous optimum"
         return RunStatus.INTERRUPTED, "stopped on request while sizes were chosen; the best choice so far is saved"
 

@@ -97,6 +97,23 @@ def test_one_mistake_is_told_once_at_its_place(definitions: str, stiffness: str,
         assert text.splitlines()[10][found.column - 1 :].startswith(stiffness)
 
 
+@pytest.mark.parametrize(
+    ("definition", "words"),
+    [
+        ("3*t", "there is no name 't'; names are k (column 3"),
+        ('"=3*t"', "there is no name 't'; names are k (column 4"),
+        ("3 * t", "there is no name 't'; names are k (column 5"),
+        ("1/h", "there is no name 'h'; names are k (column 3"),
+        ("2 / s", "there is no name 's'; names are k (column 5"),
+    ],
+)
+def test_products_of_names_are_not_told_as_units_or_times(definition: str, words: str) -> None:
+    (found,) = mistakes(SMALL.replace("format: 1\n", f"format: 1\ndefine: {{k: {definition}}}\n"))
+    assert words in found.message
+    assert "SI units" not in found.message
+    assert "formula of time" not in found.message
+
+
 def test_what_uses_a_name_that_has_a_mistake_is_not_told_again() -> None:
     text = DEFINED.replace("k: 22.5", "k: 22.5.1").replace("pulse: n", "pulse: k")
     (found,) = mistakes(text)

@@ -56,12 +56,37 @@ def test_a_number_with_a_unit_needs_no_quotation_marks_that_a_shell_takes_away()
 
 @pytest.mark.parametrize("value", ["null", None])
 def test_null_removes_a_key_as_in_a_case_that_extends_another(value: str | None) -> None:
-    without = read_case(SMALL, overrides={"constraints": value, "members.belts.max_length": value})
+    text = SMALL.replace("to: q,", "to: q, max_length: 2.5,")
+    without = read_case(text, overrides={"constraints": value, "members.belts.max_length": value})
+    assert len(without.members[0]) == len(read_case(SMALL).members[0]) > len(read_case(text).members[0])
     assert read_case(SMALL).constraints
     assert without.constraints == ()
-    assert read_case(SMALL, overrides=without.overrides) == without
+    assert read_case(text, overrides=without.overrides) == without
     found = mistakes(SMALL, {"bodies.a.mass": value})
     assert [m.message for m in found] == ["the key 'mass' is missing (mass, in kg)"]
+
+
+@pytest.mark.parametrize(
+    ("key", "path", "hint"),
+    [
+        ("members.belts.laws", "members.belts.laws", ", did you mean 'law'?"),
+        ("membrs.belts.max_length", "membrs", ", did you mean 'members'?"),
+        ("uncertainty.sample", "uncertainty", ""),
+        ("combine.weights.G", "combine", ""),
+    ],
+)
+@pytest.mark.parametrize("value", ["null", None])
+def test_null_for_a_key_that_is_not_there_is_refused(value: str | None, key: str, path: str, hint: str) -> None:
+    found = mistakes(SMALL, {key: value})
+    assert [(m.path_key, m.message) for m in found] == [(path, f"there is no such key to remove{hint}")]
+    assert found[0].located("x.yaml").startswith(f"--set {key}: ")
+
+
+def test_null_in_braces_and_for_an_item_of_a_list_removes_nothing() -> None:
+    assert [m.path_key for m in mistakes(SMALL, {"constraints[0]": "null"})] == ["constraints[0]"]
+    assert [m.path_key for m in mistakes(SMALL, {"bodies.a": "{mass: null, inertia: 3, position: [0, 0]}"})] == [
+        "bodies.a.mass"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -202,6 +202,13 @@ def test_a_mass_that_is_fixed_to_a_first_link_without_one_is_told_to_be_left_out
     assert told == ["the mass of 'base' is left out: it is fixed to a first link without mass, taken for ground"]
 
 
+@pytest.mark.parametrize("number", ["nan", "inf"])
+def test_an_inertia_that_is_no_number_is_refused_with_its_body(number: str) -> None:
+    arm = f'<link name="arm"><inertial><mass value="1"/><inertia ixx="{number}" iyy="1" izz="1"/></inertial></link>'
+    with pytest.raises(ImportedError, match="body 'arm': its mass or its inertia is no number"):
+        robot_in(Path("arm.urdf"), f"<robot>{arm}</robot>")
+
+
 def test_a_robot_of_nested_bodies_has_the_masses_of_its_shapes() -> None:
     case, told = case_of(MJCF, "toy.xml")
     cart, pole, ball = case.bodies

@@ -10,6 +10,8 @@ import pytest
 
 import mdstopo
 from mdstopo import Case, CaseError, Evaluation, Trajectory, evaluate, load_case, simulate
+from mdstopo.case.reader import read_case
+from mdstopo.functions import Responses
 from tests.engine.scenes import CASES, paper, random_scene, read, spring_scene
 
 
@@ -180,18 +182,43 @@ def test_a_path_in_the_place_of_a_case_is_refused_with_what_makes_one(call):
 def test_overrides_that_are_no_mapping_are_refused_in_words():
     with pytest.raises(TypeError, match="overrides: found list, needed is a mapping"):
         load_case(CASES / "fig6.yaml", ["solver.tolerance=1e-6"])
+    with pytest.raises(TypeError, match="overrides: found list, needed is a mapping"):
+        read_case((CASES / "fig6.yaml").read_text(), overrides=["solver.tolerance=1e-6"])
+    with pytest.raises(TypeError, match="overrides: found list"):
+        load_case(CASES / "fig6.yaml", [])
 
 
 def test_a_complex_design_is_refused_as_its_imaginary_part_would_be_lost():
     case = paper("fig6")
+    alpha = np.full(case.n_design, 0.1 + 1e-20j)
     with pytest.raises(ValueError, match="alpha must be real, not complex"):
-        evaluate(case, np.full(case.n_design, 0.1 + 1e-20j))
+        evaluate(case, alpha)
+    with pytest.raises(ValueError, match="x must be real, not complex"):
+        Responses(case).at(alpha)
+    scene = spring_scene()
+    scene["design"]["variables"] = {"w": {"of": "define.w", "lower": 1.0, "upper": 8.0, "initial": 4.0}}
+    scene["define"] = {"w": 4.0}
+    scene["bodies"]["mass"]["mass"] = "=w"
+    varied = read(scene)
+    assert varied.variables
+    with pytest.raises(ValueError, match="w must be real, not complex"):
+        evaluate(varied, variables={"w": 4.0 + 1e-20j})
 
 
-@pytest.mark.parametrize("copied", [lambda it: pickle.loads(pickle.dumps(it)), copy.deepcopy])
-def test_a_copy_of_a_trajectory_has_its_states_and_says_what_it_has_not(copied):
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copied_trajectory_has_states_between_its_steps(copied):
     motion = simulate(paper("fig6"))
     other = copied(motion)
+    times = np.linspace(motion.t[0], motion.t[-1], 7)
+    assert np.array_equal(other.at(times).q, motion.at(times).q)
+    assert np.array_equal(other.a, motion.a)
+    assert repr(other) == repr(motion)
+    assert (other.q is motion.q) == (copied is copy.copy)
+
+
+def test_a_pickled_trajectory_has_its_steps_alone_and_says_so():
+    motion = simulate(paper("fig6"))
+    other = pickle.loads(pickle.dumps(motion))
     for name in ("t", "q", "v", "a", "lam"):
         assert np.array_equal(getattr(other, name), getattr(motion, name))
     assert repr(other) == repr(motion)

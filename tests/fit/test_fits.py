@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -218,3 +220,20 @@ def test_each_motion_of_a_fit_is_counted_once(drop: FitProblem) -> None:
     last = run_fit(problem, before=stopped)
     # one more: the minimum of the first start alone
     assert last.simulations == counted + 1
+
+
+def test_a_step_to_values_that_are_too_large_to_square_is_made_shorter() -> None:
+    """The first step goes to the minimum at 0.3; there, as below 0.45, squares of the misfit overflow."""
+    problem = SimpleNamespace(
+        lower=np.zeros(1), upper=np.ones(1), names=("x",), count=1, fit=SimpleNamespace(loss="linear"),
+        parts=[slice(0, 1)], measured=[SimpleNamespace(series=SimpleNamespace(name="height"))],
+        misfit=lambda x: ("", x - 0.3 if x[0] >= 0.45 else np.full(1, 1e200)), slopes=lambda x: np.ones((1, 1)),
+    )  # fmt: skip
+    seen: list[float] = []
+    with np.errstate(over="raise"):
+        found = minimum(
+            cast(FitProblem, problem), np.full(1, 0.9), np.ones(1), seen=lambda each: seen.append(each.x[0])
+        )
+    assert found.x[0] == pytest.approx(0.45, abs=0.02)
+    assert min(seen) >= 0.45
+    assert np.isfinite(found.cost)

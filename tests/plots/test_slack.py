@@ -113,11 +113,20 @@ def test_the_legend_shows_a_symbol_as_it_is_where_the_view_has_it_end_on() -> No
         ("y: {acceleration: {formula: 'sin(6*t) - 1'}}", [0.0, -1.0], 1.0),
         ("x: {position: 1 - 0.2*t^2}", [-1.0, 0.0], 1.0),
         ("y: {acceleration: 0}", [0.0, 1.0], 1.0),  # as it moves at the start
+        ("y: {velocity: 2 - 3*t}", [0.0, 1.0], 1.0),  # braking, as a velocity and as an acceleration
+        ("y: {acceleration: -3}", [0.0, -1.0], 1.0),
+        ("y: {velocity: {table: [[0, 2], [1, 2], [5, -50]]}}", [0.0, 1.0], 1.0),  # the load case ends at 1 s
+        ("y: {velocity: {table: [[-1, -50], [0, 2], [2, 5]]}}", [0.0, 1.0], 1.0),
+        (
+            "y: {position: {table: [[0, 0], [2, 1.6], [4, -11.2], [6, -52.8]]}}",
+            [0.0, 1.0],
+            1.0,
+        ),  # no row within it but the first
         ("angle: {velocity: 3}", None, 1.0),
         ("angle: {acceleration: -3}", None, -1.0),
     ],
 )
-def test_the_arrow_of_a_prescribed_motion_points_the_way_it_goes(
+def test_the_arrow_of_a_prescribed_motion_has_the_sign_of_what_is_prescribed_where_it_is_largest(
     motion: str, way: list[float] | None, size: float
 ) -> None:
     (symbol,) = [each for each in symbols(case_of(motion=motion)) if each.kind in ("motion", "turning")]

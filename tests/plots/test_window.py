@@ -333,8 +333,8 @@ def bodies_lines(source: Any) -> list[Any]:
 def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(
     names: tuple[str, str], seconds: tuple[str, str]
 ) -> None:
-    from mdstopo.plots.designs_plot import MORE, draw_pair
-    from mdstopo.plots.style import styled
+    from mdstopo.plots.designs_plot import draw_pair
+    from mdstopo.plots.style import difference, styled
 
     text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
     a, b = "{body: a, at: [0, 0]}", "{body: b, at: [4, 0.3]}"
@@ -347,7 +347,7 @@ def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(
         both.append(source)
     with styled() as module:
         figure = draw_pair(module, *both, ("first", "second"))
-    wanted = matplotlib.colors.to_rgba(MORE)
+    wanted = matplotlib.colors.to_rgba(difference())
     found = [
         sum(
             len(each.get_segments())
@@ -361,8 +361,8 @@ def test_a_difference_between_two_members_of_the_same_points_is_drawn_as_that(
 
 @pytest.mark.parametrize("largest", [1.0, 0.25])
 def test_two_designs_are_as_wide_as_they_are_beside_each_other(largest: float) -> None:
-    from mdstopo.plots.designs_plot import MORE, draw_pair
-    from mdstopo.plots.style import styled
+    from mdstopo.plots.designs_plot import draw_pair
+    from mdstopo.plots.style import difference, styled
     from mdstopo.plots.thickness import alike
 
     text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
@@ -376,8 +376,20 @@ def test_two_designs_are_as_wide_as_they_are_beside_each_other(largest: float) -
     assert one.what == other.what == f"alpha, up to {0.8 * largest:.3g}"
     with styled() as module:  # each member is twice as large in the second
         figure = draw_pair(module, *both, ("first", "second"))
-    wanted = matplotlib.colors.to_rgba(MORE)
+    wanted = matplotlib.colors.to_rgba(difference())
     drawn = [
         len(each.get_segments()) for each in figure.axes[3].collections if tuple(each.get_colors()[:1].flat) == wanted
     ]
     assert sum(drawn) == 3
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_colour_of_differences_is_told_from_paper_ink_and_groups(dark: bool) -> None:
+    """Farther from each, in sRGB, than a quarter of the way from black to white."""
+    from mdstopo.plots.style import COLOURS, colour, difference, ink, paper, styled
+
+    with styled(dark):
+        others = [paper(), *(colour(k) for k in range(len(COLOURS))), *map(ink, ("full", "middle", "faint"))]
+        own = np.array(matplotlib.colors.to_rgb(difference()))
+    for other in others:
+        assert np.linalg.norm(own - matplotlib.colors.to_rgb(other)) > 0.25 * np.sqrt(3.0), other

@@ -154,7 +154,23 @@ def test_members_of_one_alpha_have_one_size():
     assert outcome.sizes.members == 1
 
 
-def test_how_far_a_long_choice_is_is_told(monkeypatch):
+@pytest.mark.parametrize("sizes", ["[0, 1]", "[0, 0.4, 1]"])
+def test_a_choice_of_sizes_says_how_far_it_is_between_evaluations_too(sizes, monkeypatch):
+    """Where all choices are tried there are no nodes; elsewhere the neighbours of the best are tried last."""
+    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.sizes.SAID_EVERY", 0.0)
+    told = []
+    outcome = run_session(case_with(sizes), notify=told.append)
+    rows = [sentence for sentence in told if sentence.startswith("choosing sizes: ")]
+    assert outcome.sizes.exhaustive == (sizes == "[0, 1]")
+    if outcome.sizes.exhaustive:
+        assert len(rows) == outcome.sizes.choices == 8
+    else:
+        assert len(rows) > outcome.sizes.nodes + 8
+    assert f" {outcome.sizes.evaluations:,} evaluations, " in rows[-1]
+
+
+def test_a_long_choice_of_sizes_tells_its_nodes_and_the_best(monkeypatch):
     monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
     monkeypatch.setattr("mdstopo.session.sizes.SAID_EVERY", 0.0)
     told = []
@@ -253,7 +269,10 @@ def test_a_sum_that_is_to_be_equal_is_not_passed_where_all_members_have_their_le
     evenly = [("{initial: 0.3", "{shared: [straps], initial: 0.3"), ("limit: 3.5", "equals: 1.6")]
     outcome = run_session(case_with(sizes, replace=evenly))
     assert outcome.status is RunStatus.FAILED
-    assert "no choice of sizes keeps the constraints: no member has at least half of its least size" in outcome.reason
+    assert outcome.reason.startswith(
+        "no choice of sizes keeps the constraints: no member is kept (none reaches half of its least size above 0), "
+        "and all members at their least sizes do not keep the constraints"
+    )
     assert outcome.alpha.tolist() == pytest.approx([0.2] * 8)
     assert outcome.constraints.tolist() == pytest.approx([0.0], abs=1e-12)
 

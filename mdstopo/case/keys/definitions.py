@@ -7,6 +7,7 @@ all of these become numbers before anything else is read, so that no kind of val
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,14 @@ from mdstopo.case.text.words import inside, shown
 from mdstopo.case.value import Value, frozen
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.formula_values import finite_value
-from mdstopo.formula.parser import WORD, Formula, parse, reserved
+from mdstopo.formula.parser import TIME, WORD, Formula, parse, reserved
 from mdstopo.formula.tree import names_in
 
 SECTION = "define"
 #: text that begins so is an expression
 MARK = "="
 _WHOLE = 2.0**53
+_WITH_UNIT = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s+[A-Za-zµ°]")
 
 
 @frozen
@@ -133,11 +135,13 @@ def with_numbers(root: Node, reading: Reading, kept: Container[str] = ()) -> Nod
 
 def formula_in(node: Node, path: str, names: Any, reading: Reading) -> Formula | None:
     """The formula at a node of text, perhaps with its mark before it; None where it is none, which is noted."""
-    text = node.text
-    # columns count from where the text begins
-    text = text.replace(MARK, " ", 1) if text.lstrip().startswith(MARK) else text
+    text, hints = node.text, {}
+    if text.lstrip().startswith(MARK):
+        text = text.replace(MARK, " ", 1)  # columns count from where the text begins
+        if not path.startswith(f"{SECTION}."):  # defined numbers do not change with time
+            hints = {TIME: f"a formula of time has no leading {MARK}"}
     try:
-        return parse(text, names)
+        return parse(text, names, hints)
     except FormulaError as error:
         reading.mistake(path, f"{error}{_without_unit(path, node.text)}", node)
         reading.ignore(node)
@@ -145,8 +149,11 @@ def formula_in(node: Node, path: str, names: Any, reading: Reading) -> Formula |
 
 
 def _without_unit(path: str, text: str) -> str:
-    """What a defined number with a unit has to be, for the end of a message; empty where there is no such thing."""
-    number = as_si(text) if path.startswith(f"{SECTION}.") else None
+    """What a defined number with a unit has to be, for the end of a message; empty where there is no such thing.
+
+    A unit stands behind a blank: `3*t` and `1/h` are products and shares of names.
+    """
+    number = as_si(text) if path.startswith(f"{SECTION}.") and _WITH_UNIT.match(text) else None
     return "" if number is None else f"; defined numbers are in SI units, without them: write {number:.15g}"
 
 

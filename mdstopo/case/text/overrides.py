@@ -11,7 +11,7 @@ from typing import Any
 from mdstopo.case.text.errors import Mistake
 from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node, YamlSyntaxError, parse
 from mdstopo.case.text.quantities import PATTERN
-from mdstopo.case.text.words import count_text, inside, shown
+from mdstopo.case.text.words import count_text, did_you_mean, inside, shown
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[([0-9]{1,9})\]")
 
@@ -23,7 +23,8 @@ def apply_overrides(
 
     A key path is written as in messages: ``solver.step``, ``constraints[0].equals`` (also ``.0.``).
     Mappings on the way that are missing are made. A value that is text is read as YAML, others as they are; but a
-    number with a unit needs no quotation marks, which a shell takes away. ``null`` removes the key.
+    number with a unit needs no quotation marks, which a shell takes away. ``null`` removes the key, which has to be
+    there.
     """
     texts: dict[str, str] = {}
     for key, value in overrides.items():
@@ -159,9 +160,13 @@ def _replaced(node: Node, steps: list[str | int], value: Node, path: str, origin
         twin.kind = MAPPING
         twin.entries = dict(node.entries)
         key, old = node.entries.get(step, (None, None))
-        if not rest and value.text and _is_empty(value):  # an empty text is a mistake: something was forgotten
-            twin.entries.pop(step, None)
-            return twin
+        if value.text and _is_empty(value):  # an empty text is a mistake: something was forgotten
+            if old is None:
+                hint = did_you_mean(step, node.entries)
+                raise WrongPathError(inside(path, step), f"there is no such key to remove{hint}")
+            if not rest:
+                del twin.entries[step]
+                return twin
         if key is None:
             key = Node(SCALAR, 1, 1, origin)
             key.text = step

@@ -65,8 +65,6 @@ _ALONE: dict[str, tuple[str, Dimension, int]] = {
 _LONGEST = 100
 #: as a regular expression of JSON Schema: a number, then what begins like a unit
 PATTERN = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*[A-Za-zµ°1/].*$"
-
-
 #: units of keys whose numbers can be anything: their users choose it, or it is that of another number
 UNSTATED = ("", "yours", "the number's unit")
 
@@ -83,37 +81,43 @@ def is_quantity(text: str) -> bool:
 
 def in_si(text: str, needed: str) -> float:
     """The number that a text like `40 mm` means in the SI unit `needed`. Raises QuantityError."""
-    from fractions import Fraction
-
     if needed in UNSTATED:
         raise QuantityError("allowed is a number: units are read where a key has one of its own")
-    found = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
-    if found is None:
-        raise QuantityError("allowed is a number and its unit, such as '40 mm'")
-    unit = unit_of(found[2])
+    number, name = _parts(text)
+    unit = unit_of(name)
     if unit.dimension != unit_of(needed).dimension:
         raise QuantityError(f"allowed is a number in {needed}, or in a unit that measures the same")
-    if needed.startswith("rad/s") and "Hz" in found[2]:
+    if needed.startswith("rad/s") and "Hz" in name:
         # 1 Hz is a turn a second, 2 pi rad/s; as 1/s it would be taken for 1 rad/s
         raise QuantityError(f"allowed is a number in {needed}; turns are counted in rev/s or rpm, not in Hz")
-    try:
-        return float(Fraction(found[1]) * unit.factor) * math.pi**unit.turns
-    except OverflowError:
-        raise QuantityError("allowed is a number that is finite in SI units") from None
+    return _value(number, unit)
 
 
 def as_si(text: str) -> float | None:
     """The number that a text like `40 mm` means in SI units, whatever it measures; None where it is no such text."""
-    from fractions import Fraction
+    try:
+        number, name = _parts(text)
+        return _value(number, unit_of(name))
+    except QuantityError:
+        return None
 
+
+def _parts(text: str) -> tuple[str, str]:
+    """The number and the unit of a text, as they are written. Raises QuantityError."""
     found = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if found is None:
-        return None
+        raise QuantityError("allowed is a number and its unit, such as '40 mm'")
+    return found[1], found[2]
+
+
+def _value(number: str, unit: Unit) -> float:
+    """A number as it is written, in SI units. Raises QuantityError where it is too large for them."""
+    from fractions import Fraction
+
     try:
-        unit = unit_of(found[2])
-        return float(Fraction(found[1]) * unit.factor) * math.pi**unit.turns
-    except (QuantityError, OverflowError):
-        return None
+        return float(Fraction(number) * unit.factor) * math.pi**unit.turns
+    except OverflowError:
+        raise QuantityError("allowed is a number that is finite in SI units") from None
 
 
 @functools.cache
