@@ -64,6 +64,13 @@ class Part:
         return self.inertia + self.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
 
 
+def _inertial(name: str, mass: float, frame: "Frame", tensor: Floats) -> Part:
+    """The stated mass of a body, its inertia (3, 3) along the axes of a frame. ValueError where one is no number."""
+    if not (np.isfinite(mass) and np.isfinite(tensor).all()):
+        raise ValueError(f"body {name!r}: its mass or its inertia is no number")
+    return Part(mass, frame.place, frame.turn @ tensor @ frame.turn.T)
+
+
 @dataclass
 class Tree:
     """Bodies and joints that were found in a file; told: remarks on what of the file is left out."""
@@ -102,8 +109,6 @@ def robot_in(path: Path, data: str, fixed: bool = False) -> tuple[Plain, list[st
     if not tree.bodies:
         raise ImportedError(f"{path}: no body in it has a mass")
     for name, part in tree.bodies.items():
-        if not (np.isfinite(part.mass) and np.isfinite(part.inertia).all()):
-            raise ImportedError(f"{path}: body {name!r}: its mass or its inertia is no number")
         least = float(np.linalg.eigvalsh(part.inertia).min())
         if part.mass < 0.0 or least < -1e-9 * np.abs(part.inertia).max():  # beyond rounding of turned parts
             found = f"the mass {part.mass:g} kg and the least moment of inertia {least:g} kg m^2"
@@ -222,7 +227,7 @@ class _Urdf:
             for each in ("xx", "yy", "zz", "xy", "xz", "yz")
         )
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return Part(float(mass.get("value", "0")), own.place, own.turn @ tensor @ own.turn.T)
+        return _inertial(name, float(mass.get("value", "0")), own, tensor)
 
     def link(self, name: str, at: Frame, body: str | None) -> None:
         """Take in a link and what hangs on it; body: that it is a part of, None for one of its own."""
@@ -381,7 +386,7 @@ class _Mjcf:
                 tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             else:
                 tensor = np.diag(_vector(inertial.get("diaginertia"), "0 0 0"))
-            return Part(float(inertial.get("mass", "0")), own.place, own.turn @ tensor @ own.turn.T)
+            return _inertial(node.get("name", ""), float(inertial.get("mass", "0")), own, tensor)
         return sum((self.geom(each, at) for each in node.findall("geom")), Part())
 
     def geom(self, node: Xml.Element, at: Frame) -> Part:
