@@ -184,7 +184,7 @@ def halves(
     integrand: its values (K,) at places (K, 2), steps and fractions of them, each between two ends (K,).
     rule (2, s): nodes and weights of the rule on (0, 1).
     tolerance: how far the rule may differ from the Gauss-Legendre sum, relative to the whole integral.
-    nothing: up to this the integral counts as zero, and no interval is halved.
+    nothing: up to this the integrand counts as zero on the mean, and no interval is halved.
     collocated: whether the rule is one of Gauss's, which a finer sum has to judge.
     """
     count = rule.shape[1]
@@ -204,7 +204,7 @@ def halves(
         better = 0.5 * width * np.einsum("ij,j->i", value[:, count:], weights)
         if np.isnan(whole):
             whole = float(np.abs(better).sum())
-            if whole <= nothing:
+            if max(whole, float(np.abs(sums).sum())) <= nothing * (t[-1] - t[0]):  # either may miss a pulse
                 break
         off = np.abs(sums - better)
         bad = (off > tolerance * whole) & (width > 2.0 * APART * (t[-1] - t[0]))
