@@ -73,11 +73,11 @@ def _checked_case(case: object) -> Case:
 
 
 def as_real(values: ArrayLike, what: str) -> FloatArray:
-    """A new array of real numbers; what: they are called in a message. Raises ValueError for complex ones."""
+    """Real numbers as an array; what: they are called in a message. Raises ValueError for complex ones."""
     if np.iscomplexobj(values):
         # conversion would drop the imaginary part, and with it derivatives by complex steps
         raise ValueError(f"{what} must be real, not complex; exact derivatives come with the values")
-    return np.array(values, dtype=np.float64)
+    return np.asarray(values, dtype=np.float64)
 
 
 def _design(case: Case, alpha: ArrayLike | None, variables: Mapping[str, ArrayLike] | None) -> FloatArray:

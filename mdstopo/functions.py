@@ -6,7 +6,8 @@
 The vector is alpha (N,) with the values of the case's variables (P,) behind it, in the parameters' own units.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,17 @@ _SIGNS = {"limit": -1.0, "at_least": 1.0, "equals": 1.0}
 
 class NoValueError(ArithmeticError):
     """A design that cannot be computed; the sentence says why."""
+
+
+@contextmanager
+def extra(name: str, package: str) -> Iterator[None]:
+    """Around the import of a package that an extra of mdstopo installs. Raises ModuleNotFoundError, which tells how to
+    install it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        why = f"mdstopo.{name} needs {package} ({error}): pip install 'mdstopo[{name}]'"
+        raise ModuleNotFoundError(why, name=error.name) from error
 
 
 class Responses:
@@ -45,7 +57,7 @@ class Responses:
 
     def at(self, x: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """The values (m,) of objectives and constraints and their derivatives (m, n), at x (n,)."""
-        asked = as_real(x, "x")
+        asked = np.array(as_real(x, "x"))  # its own: it is compared with the next one
         if self._last is None or not np.array_equal(self._last[0], asked):
             alpha, values = asked[: self.case.n_design], self.case.space.named(asked)
             found = evaluate(self.case, alpha, variables=values, method=self._method)

@@ -14,14 +14,11 @@ from typing import Any
 
 import numpy as np
 
-try:
-    import jax
-except ModuleNotFoundError as error:
-    why = f"mdstopo.jax needs JAX ({error}): pip install 'mdstopo[jax]'"
-    raise ModuleNotFoundError(why, name=error.name) from error
-
 from mdstopo.case.model import Case
-from mdstopo.functions import Responses
+from mdstopo.functions import Responses, extra
+
+with extra("jax", "JAX"):
+    import jax
 
 
 def function(case: Case, method: str = "auto") -> Callable[[Any], Any]:

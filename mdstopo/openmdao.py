@@ -12,14 +12,11 @@ from typing import Any
 
 import numpy as np
 
-try:
-    import openmdao.api as om
-except ModuleNotFoundError as error:
-    why = f"mdstopo.openmdao needs OpenMDAO ({error}): pip install 'mdstopo[openmdao]'"
-    raise ModuleNotFoundError(why, name=error.name) from error
-
 from mdstopo.case.model import Case
-from mdstopo.functions import NoValueError, Responses
+from mdstopo.functions import NoValueError, Responses, extra
+
+with extra("openmdao", "OpenMDAO"):
+    import openmdao.api as om
 
 
 class CaseComponent(om.ExplicitComponent):  # type: ignore[misc, unused-ignore]

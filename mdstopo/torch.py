@@ -12,15 +12,12 @@ the gradient do not exist, and PyTorch says so.
 from collections.abc import Callable
 from typing import Any
 
-try:
+from mdstopo.case.model import Case
+from mdstopo.functions import Responses, extra
+
+with extra("torch", "PyTorch"):
     import torch
     from torch.autograd.function import once_differentiable
-except ModuleNotFoundError as error:
-    why = f"mdstopo.torch needs PyTorch ({error}): pip install 'mdstopo[torch]'"
-    raise ModuleNotFoundError(why, name=error.name) from error
-
-from mdstopo.case.model import Case
-from mdstopo.functions import Responses
 
 
 def function(case: Case, method: str = "auto") -> Callable[[Any], Any]:

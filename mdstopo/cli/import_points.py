@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from itertools import chain, pairwise
 from pathlib import Path
 
+from mdstopo.case.text.words import DECIMAL_SIGN
 from mdstopo.shown import counted
 
 Point = tuple[float, ...]
@@ -23,7 +24,6 @@ DXF_UNITS = {
 }  # fmt: skip
 #: SVG commands of a path and how many numbers each takes; the last two are where it ends
 SVG_COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
-POINT = " (the decimal sign is a point)"
 _LENGTH = r"(?:-|[nuµμmcdk]?m|in|inch|inches|ft|feet|yd|mi|px|pt|pixels?|met(?:er|re)s?|millimet(?:er|re)s?)"
 #: a letter with its unit in the name of a column, and a unit that blanks have made a cell of its own
 _WITH_UNIT = re.compile(rf"([xyz])(?:\s*\[{_LENGTH}\]|\s*\({_LENGTH}\)|\s*/\s*{_LENGTH}|[_ ]{_LENGTH})")
@@ -109,7 +109,7 @@ def _is_number(cell: str) -> bool:
 
 def _decimal(cells: list[str]) -> str:
     """What is said of numbers with a decimal comma, empty where there is none."""
-    return POINT if any(re.fullmatch(r"[-+]?\d+,\d+", cell) for cell in cells) else ""
+    return f" ({DECIMAL_SIGN})" if any(re.fullmatch(r"[-+]?\d+,\d+", cell) for cell in cells) else ""
 
 
 def _named_point(names: list[str], cells: list[str], delimiter: str) -> tuple[str, Point]:
@@ -119,7 +119,7 @@ def _named_point(names: list[str], cells: list[str], delimiter: str) -> tuple[st
     last = len(names) - 1  # may be a remark with separators in it
     more = filled > len(names) and (last in columns or not cells[last] or _is_number(cells[last]))
     if more or (delimiter == " " and filled < len(names)):
-        hint = POINT if delimiter == "," and re.search(r"\d,\d", ",".join(cells)) else ""
+        hint = f" ({DECIMAL_SIGN})" if delimiter == "," and re.search(r"\d,\d", ",".join(cells)) else ""
         told = f"found {delimiter.join(cells)}{hint}, which has {counted(filled, 'cell')}"
         raise ValueError(f"{told}; the line of names has {len(names)}")
     for column in columns:

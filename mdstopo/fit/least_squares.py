@@ -27,7 +27,7 @@ TURNS, SETTLED = 40, 1e-6
 #: a deviation that is estimated is at least this share of the largest value, or of a unit where all are zero
 LEAST_DEVIATION = 1e-12
 #: standard deviations that a value may be off at the start: squares of more are soon too large for numbers
-LARGEST = 1e100
+MOST_DEVIATIONS = 1e100
 #: how many standard deviations the median of magnitudes is, of normal residuals
 MEDIAN = 0.6744897501960817
 #: why SciPy's least_squares has ended, by its status
@@ -222,10 +222,10 @@ def minimum(
 def _too_large(problem: FitProblem, misfit: FloatArray, deviation: FloatArray) -> str:
     """Which series is so many deviations (n,) off by a misfit (n,) that nothing can be computed of it; empty: none."""
     for each, part in zip(problem.measured, problem.parts, strict=True):
-        if not np.all(np.abs(misfit[part]) < LARGEST * deviation[part]):
+        if not np.all(np.abs(misfit[part]) < MOST_DEVIATIONS * deviation[part]):
             return (
-                f"{each.series.name} is more than {LARGEST:.0e} of its deviations off, too many to compute with: "
-                "look at deviation, value_scale and offset"
+                f"{each.series.name} is more than {MOST_DEVIATIONS:.0e} of its deviations off, too many to compute with"
+                ": look at deviation, value_scale and offset"
             )
     return ""
 

@@ -9,7 +9,7 @@ from mdstopo.case.keys.brought_records import Brought, BroughtError
 from mdstopo.case.keys.kinds import Kind, Name, Schema, Word, check_name
 from mdstopo.case.text.nodes import MAPPING, SCALAR, SEQUENCE, Node
 from mdstopo.case.text.reading import BAD, Fields, Reading, Reference, found
-from mdstopo.case.text.words import inside, listed, nearest, shown
+from mdstopo.case.text.words import DECIMAL_SIGN, inside, listed, nearest, shown
 from mdstopo.case.value import Value, frozen
 
 
@@ -392,7 +392,7 @@ class Record(Value):
                 meant.add(best)
                 hint = f", did you mean {best!r}?"
             elif text.isdigit() and value.kind == SCALAR and not value.text:  # {mass: 1,5}
-                hint = " (the decimal sign is a point),"
+                hint = f" ({DECIMAL_SIGN}),"
             message = f"unknown key {shown(text)}{hint or ','} allowed are {listed(known)}{self._or_alone()}"
             reading.mistake(inside(path, text), message, key)
         return meant

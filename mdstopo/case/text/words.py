@@ -7,6 +7,8 @@ from itertools import islice
 
 #: the fixed body
 GROUND = "ground"
+#: what is told of a number with a decimal comma
+DECIMAL_SIGN = "the decimal sign is a point"
 
 _LONGEST = 60
 _MOST = 60
