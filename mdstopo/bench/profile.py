@@ -37,7 +37,7 @@ PHASES = {
     "peaks_of_pieces": "responses",
     "rank_rows": "responses",
     "compare": "responses",
-    "sample_response": "responses",
+    "sample_responses": "responses",
     "rows_vjp": "reverse sweeps",
     "rows_with_gradients": "responses with their reverse sweeps",
     "integral_with_gradient": "integrals with their reverse sweeps",

@@ -70,6 +70,12 @@ class DriverWithRun(Protocol):
         wanted.
         """
 
+    def values_at(
+        self, js: IndexArray, places: FloatArray, count: int, exact: bool = False, who: IndexArray | None = None
+    ) -> FloatArray:
+        """(K, R): values of responses js (R,) at places (K, 2), as of `sample_response`; who (K, R): the members whose
+        forces are meant, by default at each place the one with the largest."""
+
     def peaks_of_pieces(
         self,
         j: int,

@@ -641,16 +641,6 @@ def test_integrals_are_followed_in_scenes_of_any_force(response):
     assert mean_square(2.0**-46) == pytest.approx(mean_square(1.0), rel=1e-9)
 
 
-def test_rounding_is_not_halved_on_and_on():
-    from mdstopo.general.over_time.quadrature_breakpoints import halves
-
-    rng = np.random.default_rng(0)
-    nodes, weights = np.polynomial.legendre.leggauss(5)
-    t = np.linspace(0.0, 1.0, 11)
-    found = halves(t, t, lambda places, _: rng.normal(size=len(places)), np.stack([nodes + 1, weights]) / 2, 1e-9)
-    assert len(found) < 1000
-
-
 #: an arm that swings there and back: every point of it comes to rest at the turns
 ARM = """
 format: 1

@@ -25,7 +25,7 @@ class Entries(NamedTuple):
     push: Any = direct.push
     rank_rows: Any = peak_search.rank_rows
     rows_vjp: Any = row_sweep.rows_vjp
-    sample_response: Any = dense_output.sample_response
+    sample_responses: Any = dense_output.sample_responses
 
 
 def entries_of(kind: IntegratorKind) -> Entries:

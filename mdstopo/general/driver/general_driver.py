@@ -138,9 +138,11 @@ class GeneralDriver:
         n = len(model.mass)
         #: arrays for the results of `evaluate_one`, and of `_integral_with_gradient`
         self._one = (
-            np.zeros((1, 2)), np.zeros((1, len(model.q0))), np.zeros((2, 1, n)), np.zeros((1, self._multipliers)),
-            np.zeros((1, 3)),
+            np.zeros(1, dtype=np.int64), np.zeros((1, 1), dtype=np.int64), np.zeros((1, 2)),
+            np.zeros((1, len(model.q0))), np.zeros((2, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 1, 3)),
         )  # fmt: skip
+        #: for states that nobody asks for
+        self._no_states = np.zeros((0, len(model.q0))), np.zeros((2, 0, n)), np.zeros((0, self._multipliers))
         self._integral_gradient = np.zeros(n_design + varied)
         #: gradients of the rows that were found, and arrays for so many rows at once
         self.row_gradients = RowGradients(self)
@@ -530,6 +532,23 @@ class GeneralDriver:
 
         Returns q (K, n_q) with v, a (2, K, n), multipliers (K, n_row + n_driven), and (K, 3) value, rate, member.
         """
+        whose = np.full((len(places), int(j >= 0)), who, dtype=np.int64)
+        js = np.array([j] if j >= 0 else [], dtype=np.int64)
+        states, lam, seen = self.sample_responses(js, places, whose, exact, count, steps, rates)
+        return states, lam, seen[:, 0] if j >= 0 else np.full((len(places), 3), np.nan)
+
+    def sample_responses(
+        self,
+        js: IndexArray,
+        places: FloatArray,
+        who: IndexArray,
+        exact: bool,
+        count: int,
+        steps: GeneralSteps | None = None,
+        rates: bool = True,
+    ) -> tuple[tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
+        """As `sample_response`, of responses js (R,), with members who (K, R); values and rates are (K, R, 3). Without
+        rates one balance at each place serves all."""
         model = self.scene.model
         packed, limits, room, room_ints, member_state = (
             ((self.ints, self.floats), self.limits, self.room, self.room_ints, self.member_state)
@@ -538,28 +557,40 @@ class GeneralDriver:
         )
         q, out = np.zeros((len(places), len(model.q0))), np.zeros((2, len(places), len(model.mass)))
         lam = np.zeros((len(places), self._multipliers))
-        seen = np.zeros((len(places), 3))
-        self.entry.sample_response(
-            self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, member_state, exact, rates, j,
+        seen = np.zeros((*who.shape, 3))
+        self.entry.sample_responses(
+            self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, member_state, exact, rates, js,
             who, places, q, out, lam, seen, self.work,
         )  # fmt: skip
         return (q, out), lam, seen
 
+    def values_at(
+        self, js: IndexArray, places: FloatArray, count: int, exact: bool = False, who: IndexArray | None = None
+    ) -> FloatArray:
+        """(K, R): values alone of responses js (R,) at places (K, 2), as `sample_responses` has them."""
+        whose = np.full((len(places), len(js)), -1) if who is None else who
+        seen = np.zeros((*whose.shape, 3))
+        self.entry.sample_responses(
+            *self._history_arguments(count), exact, False, js, whose, places, *self._no_states, seen, self.work
+        )
+        values: FloatArray = seen[:, :, 0]
+        return values
+
     @property
     def _multipliers(self) -> int:
-        """How many `sample_response` gives: of the solved rows and of the driven coordinates."""
+        """How many multipliers `sample_responses` gives: of the solved rows and of the driven coordinates."""
         return int(self.scene.model.size[0]) + len(self.scene.model.driven)
 
     def evaluate_one(self, j: int, count: int, place: FloatArray, who: int = -1) -> FloatArray:
         """(3,) value, rate, member of response j at one place (2,), exactly; who: as of `sample_response`. The array is
         the driver's own: the next call overwrites it."""
-        places, q, out, lam, seen = self._one
-        places[0] = place
+        js, whose, places, q, out, lam, seen = self._one
+        js[0], whose[0], places[0] = j, who, place
         self.ready(
-            "sample_response", self.entry.sample_response, *self._history_arguments(count), True, True, j, who, places,
-            q, out, lam, seen, self.work,
+            "sample_responses", self.entry.sample_responses, *self._history_arguments(count), True, True, js, whose,
+            places, q, out, lam, seen, self.work,
         )  # fmt: skip
-        found: FloatArray = seen[0]
+        found: FloatArray = seen[0, 0]
         return found
 
     def steps_arguments(self, count: int) -> tuple[Any, ...]:
@@ -720,8 +751,10 @@ class GeneralDriver:
         """(n_resp, T): every response of a design at times (T,), which its motion reaches."""
         _, count, _ = self.run(alpha, False)
         places = self.places_at(times, count)
-        responses = range(len(self.scene.responses))
-        return np.array([self.sample_response(j, places, True, count)[2][:, 0] for j in responses])
+        js = np.arange(len(self.scene.responses))
+        who = np.full((len(places), len(js)), -1)
+        values = self.sample_responses(js, places, who, True, count, rates=False)[2][:, :, 0]
+        return np.ascontiguousarray(values.T)
 
     def places_at(self, times: FloatArray, count: int) -> FloatArray:
         """(T, 2): in which of the last run's steps, `count`, times (T,) are, and at what fraction of it."""

@@ -59,8 +59,9 @@ def observe(driver: GeneralDriver, design: FloatArray, times: FloatArray, rates:
     states = np.where(times - t[behind - 1] < t[behind] - times, behind - 1, behind)
     assert np.all(np.abs(t[states] - times) <= TOGETHER * (t[-1] - t[0])), "steps do not end where they have to"
     places = np.stack([np.maximum(states - 1.0, 0.0), (states > 0).astype(np.float64)], axis=1)
-    seen = np.array([driver.sample_response(j, places, True, count, rates=rates)[2] for j in range(shape[0])])
-    by_kind = np.ascontiguousarray(np.moveaxis(seen, 2, 0))
+    js, who = np.arange(shape[0]), np.full(shape[::-1], -1)
+    seen = driver.sample_responses(js, places, who, True, count, rates=rates)[2]
+    by_kind = np.ascontiguousarray(seen.T)
     return Observed(Status.OK, "", count, inside, states, *by_kind)
 
 

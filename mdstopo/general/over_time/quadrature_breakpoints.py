@@ -4,18 +4,20 @@ The integral of a response is that of one more coordinate, by the weights of the
 it. A norm or an absolute value has a complex singularity as near to the real axis as it comes to zero, however smooth
 the motion is; the nearer it is, the shorter steps beside it have to be. And a driven body, or one that hardly feels its
 members, takes steps in which a smooth response is no polynomial. So the weights' sum over each step is compared
-with a Gauss-Legendre sum, on the quintic through the step's ends, and steps are halved until both agree. The motion is
-computed once more with steps that end at these middles; since steps between them are chosen anew, all is checked again.
-Steps of fixed length promise no accuracy, and stay as they are.
+with that of a better rule (`nested_rules`), on the quintic through the step's ends, and steps are halved until both
+agree. The motion is computed once more with steps that end at these middles; since steps between them are chosen anew,
+all is checked again. Steps of fixed length promise no accuracy, and stay as they are.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.over_time.kinks import kinks
 from mdstopo.general.over_time.motion_sizes import motion_sizes, rounding_of
+from mdstopo.general.over_time.nested_rules import NestedRules, nested_rules
 from mdstopo.general.responses.general_responses import has_kinks, switches_of
 from mdstopo.general.steps.run_start import method_number
 from mdstopo.general.steps.step_history import FIRST
@@ -24,9 +26,6 @@ from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.scene.signal_segments import APART
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
-#: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than a method's own weights; than collocation's, too
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-FINE_NODES, FINE_WEIGHTS = np.polynomial.legendre.leggauss(20)
 #: how often an evaluation looks for breakpoints
 ROUNDS = 3
 #: how far both sums over a step may differ, relative to the tolerance and the whole integral: derivatives bend more
@@ -39,12 +38,14 @@ HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
 #: a response that is smaller by this at both ends of a step than in its middle, in this share of all steps, is zero in
 #: truth: joints hold it there, which states keep to and what is between them misses
 MISSED, MOSTLY = 1e-3, 0.75
+#: how many steps are looked at before all are, and in which share of them it has to be so
+FEW, OFTEN = 32, 0.5
 #: at how many places inside a step values are looked at, at least, and in all steps of a run together; where in its
 #: part of a step each is, beside the middle, where much is symmetric
 INSIDE, IN_RUN, BESIDE = 3, 64, 0.4
 
-#: places (K, 2), and between which two ends each is (K,) -> values (K,)
-Integrand = Callable[[FloatArray, IndexArray], FloatArray]
+#: places (K, 2), and between which two ends each is (K,) -> values (K, R)
+Integrands = Callable[[FloatArray, IndexArray], FloatArray]
 
 
 def followed_integrals(driver: DriverWithRun, count: int) -> dict[int, float]:
@@ -56,7 +57,8 @@ def followed_integrals(driver: DriverWithRun, count: int) -> dict[int, float]:
         return {}
     sizes = motion_sizes(driver, count)
     nothing = {j: rounding_of(driver, j, sizes) for j in integrals}
-    return {j: size for j, size in nothing.items() if not _is_held_at_zero(driver, j, count, size)}
+    held = _held_at_zero(driver, count, nothing)
+    return {j: size for j, size in nothing.items() if j not in held}
 
 
 def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Mapping[int, float]) -> list[float]:
@@ -75,147 +77,148 @@ def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Mapping[
         return found
     ends = np.unique(np.concatenate([t, found, driver.quadrature_breakpoints]))
     ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]
-    rule = _rule(driver, count)
-    for j, square in integrals:
-        integrand = _integrand(driver, j, t, ends, square)
-        nothing = followed[j] ** 2 if square else followed[j]
-        found += halves(
-            t,
-            ends,
-            integrand,
-            rule,
-            SHARE * float(driver.settings[0]),
-            nothing * float(t[-1] - t[0]),
-            driver.method.collocates,
-        )
-    return found
+    integrands = _integrands(driver, integrals, t, ends)
+    nothing = np.array([followed[j] ** 2 if square else followed[j] for j, square in integrals])
+    tolerance = SHARE * float(driver.settings[0])
+    return found + halves(t, ends, integrands, _rules(driver, count), tolerance, nothing)
 
 
-def _is_held_at_zero(driver: DriverWithRun, j: int, count: int, nothing: float) -> bool:
-    """Whether response j is zero in all states, and between them but for what is missed there: as far as its size
-    tells, or, of what is never negative, its values at the ends of steps beside those within.
+def _held_at_zero(driver: DriverWithRun, count: int, nothing: Mapping[int, float]) -> set[int]:
+    """The responses that are zero in all states, and between them but for what is missed there: as far as their sizes
+    tell, or, of what is never negative, their values at the ends of steps beside those within.
 
-    nothing: up to what size it is rounding; 0: that is not known.
+    nothing: by response up to what size it is rounding; 0: that is not known.
     """
-    if nothing == 0.0 and not has_kinks(driver.scene.model, j):
-        return False
+    model = driver.scene.model
+    asked = [j for j, size in nothing.items() if size > 0.0 or has_kinks(model, j)]
+    steps = np.arange(count)
+    if count > FEW:  # what is not often zero in some steps is not mostly zero in all
+        asked = _seem_held(driver, count, {j: nothing[j] for j in asked}, steps[:: count // FEW], OFTEN)
+    return set(_seem_held(driver, count, {j: nothing[j] for j in asked}, steps, MOSTLY))
 
-    def size(fraction: float, exact: bool = False) -> FloatArray:
-        places = np.column_stack([np.arange(count, dtype=np.float64), np.full(count, fraction)])
-        value: FloatArray = driver.sample_response(j, places, exact, count, rates=False)[2][:, 0]
-        return np.abs(value)
 
-    ends = np.maximum(size(0.0), size(1.0))
-    is_rounding = nothing > 0.0 and bool(np.all(ends <= nothing))
-    if not (is_rounding or has_kinks(driver.scene.model, j)):
-        return False
+def _seem_held(
+    driver: DriverWithRun, count: int, nothing: Mapping[int, float], steps: IndexArray, share: float
+) -> list[int]:
+    """Those of responses that are zero, as `_held_at_zero` has it, in some of the steps.
+
+    nothing: of the responses that are asked for. steps (S,): which steps are looked at. share: in which of them values
+    have to be missed.
+    """
+    if not nothing:
+        return []
+    js = np.array(list(nothing))
+    limit = np.array(list(nothing.values()))
+
+    def sizes(fraction: float, exact: bool = False) -> FloatArray:
+        """(S, R): magnitudes at a fraction of each step."""
+        places = np.column_stack([steps.astype(np.float64), np.full(len(steps), fraction)])
+        return np.abs(driver.values_at(js, places, count, exact=exact))
+
+    ends = np.maximum(sizes(0.0), sizes(1.0))
+    is_rounding = (limit > 0.0) & np.all(ends <= limit, axis=0)
+    kinked = np.array([has_kinks(driver.scene.model, j) for j in js.tolist()])
+    if not np.any(is_rounding | kinked):
+        return []
     places = max(INSIDE, -(-IN_RUN // count))
     inside = ((np.arange(places) + BESIDE) / places).tolist()
-    between = np.max([size(fraction) for fraction in inside], axis=0)
-    if not (is_rounding or _are_missed(ends, between)):
-        return False
+    between = np.max([sizes(fraction) for fraction in inside], axis=0)
+    seem = is_rounding | (kinked & _are_missed(ends, between, share))
+    if not np.any(seem):
+        return []
     # a force that is zero wherever steps end is not zero in the method's own motion within them
-    states = np.maximum(ends, np.max([size(fraction, exact=True) for fraction in inside], axis=0))
-    return (is_rounding and bool(np.all(states <= nothing))) or _are_missed(states, between)
+    states = np.maximum(ends, np.max([sizes(fraction, exact=True) for fraction in inside], axis=0))
+    seem &= (is_rounding & np.all(states <= limit, axis=0)) | _are_missed(states, between, share)
+    return list(js[seem].tolist())
 
 
-def _are_missed(states: FloatArray, between: FloatArray) -> bool:
-    """Whether sizes (S,) in states of steps are next to nothing beside those between the states."""
-    return bool(np.count_nonzero(states < MISSED * between) >= MOSTLY * len(states))
+def _are_missed(states: FloatArray, between: FloatArray, share: float) -> NDArray[np.bool_]:
+    """(R,): whether sizes (S, R) in states of steps are next to nothing beside those between them, in a share of
+    them."""
+    missed: NDArray[np.bool_] = np.count_nonzero(states < MISSED * between, axis=0) >= share * len(states)
+    return missed
 
 
-def _integrand(driver: DriverWithRun, j: int, t: FloatArray, ends: FloatArray, square: bool) -> Integrand:
-    """Values of response j; those of an expression with switches go on between two `ends` as they are in their middle.
+def _integrands(
+    driver: DriverWithRun, integrals: Sequence[tuple[int, bool]], t: FloatArray, ends: FloatArray
+) -> Integrands:
+    """Values of responses; those of an expression with switches go on between two `ends` as they are in their middle.
 
-    driver: with a finished run. t (m + 1,): its steps' times (s).
-    ends (k + 1,): where steps end or will have to end (s).
-    square: whether their squares are meant.
+    driver: with a finished run. integrals: the responses, and whether their squares are meant.
+    t (m + 1,): its steps' times (s). ends (k + 1,): where steps end or will have to end (s).
     """
     count = len(t) - 1
+    js = np.array([j for j, _ in integrals])
+    squared = np.array([square for _, square in integrals])
+    switched = [r for r, j in enumerate(js.tolist()) if switches_of(driver.scene.model, j)]
+    sides = np.full((len(ends) - 1, len(js)), -1)
+    if switched:
+        middle = 0.5 * (ends[:-1] + ends[1:])
+        step = np.clip(np.searchsorted(t, middle, side="right") - 1, 0, count - 1)
+        at = np.column_stack([step, (middle - t[step]) / (t[step + 1] - t[step])])
+        for r in switched:
+            sides[:, r] = driver.sample_response(int(js[r]), at, False, count, rates=False)[2][:, 2]
 
-    def sample(places: FloatArray, who: int) -> FloatArray:
-        value: FloatArray = driver.sample_response(j, places, False, count, who=who, rates=False)[2][:, 0]
-        return value * value if square else value
+    def values(places: FloatArray, within: IndexArray) -> FloatArray:
+        value = driver.values_at(js, places, count, who=sides[within])
+        return np.where(squared, value * value, value)
 
-    if not switches_of(driver.scene.model, j):
-        return lambda places, within: sample(places, -1)
-    middle = 0.5 * (ends[:-1] + ends[1:])
-    step = np.clip(np.searchsorted(t, middle, side="right") - 1, 0, count - 1)
-    at = np.column_stack([step, (middle - t[step]) / (t[step + 1] - t[step])])
-    sides = driver.sample_response(j, at, False, count, rates=False)[2][:, 2].astype(np.int64)
-
-    def on_sides(places: FloatArray, within: IndexArray) -> FloatArray:
-        value = np.empty(len(places))
-        for side in np.unique(sides[within]).tolist():
-            own = sides[within] == side
-            value[own] = sample(places[own], side)
-        return value
-
-    return on_sides
+    return values
 
 
-def _rule(driver: DriverWithRun, count: int) -> FloatArray:
-    """Nodes and weights (2, s) on (0, 1) by which stages integrate; where steps differ in that, the least of them."""
+def _rules(driver: DriverWithRun, count: int) -> NestedRules:
+    """The rule by which stages integrate, and a better one; where steps differ in that, the least of them."""
     tables, model = driver.method.tables, driver.scene.model
     if driver.method.collocates:
         first = driver.index_of_steps()[: count + 1, FIRST]
         least = int(np.diff(first).min())
-        rule: FloatArray = tables[LEVELS.index(least), 0, :2, :least]
-        return rule
-    method = method_number.py_func(model)  # type: ignore[attr-defined]
-    vectors = tables[method, 2, :, : STAGES[method]]
-    weighed = vectors[2] != 0.0
-    return np.stack([vectors[0][weighed], vectors[2][weighed]])
+        nodes, weights = tables[LEVELS.index(least), 0, :2, :least]
+    else:
+        method = method_number.py_func(model)  # type: ignore[attr-defined]
+        vectors = tables[method, 2, :, : STAGES[method]]
+        nodes, weights = vectors[0][vectors[2] != 0.0], vectors[2][vectors[2] != 0.0]
+    return nested_rules(tuple(nodes.tolist()), tuple(weights.tolist()))
 
 
 def halves(
-    t: FloatArray,
-    ends: FloatArray,
-    integrand: Integrand,
-    rule: FloatArray,
-    tolerance: float,
-    nothing: float = 0.0,
-    collocated: bool = False,
+    t: FloatArray, ends: FloatArray, integrands: Integrands, rules: NestedRules, tolerance: float, nothing: FloatArray
 ) -> list[float]:
     """Times that halve the intervals between `ends`, and their halves, until a rule of integration is good on each.
 
     t (m + 1,): ends of the steps (s), all of them among `ends`.
     ends (k + 1,): times at which steps end or will have to end (s).
-    integrand: its values (K,) at places (K, 2), steps and fractions of them, each between two ends (K,).
-    rule (2, s): nodes and weights of the rule on (0, 1).
-    tolerance: how far the rule may differ from the Gauss-Legendre sum, relative to the whole integral.
-    nothing: up to this the integrand counts as zero on the mean, and no interval is halved.
-    collocated: whether the rule is one of Gauss's, which a finer sum has to judge.
+    integrands: their values (K, R) at places (K, 2), steps and fractions of them, each between two ends (K,).
+    rules: the rule, and a better one.
+    tolerance: how far both may differ, relative to the whole integral.
+    nothing (R,): up to this an integrand counts as zero on the mean, and no interval is halved for it.
     """
-    count = rule.shape[1]
-    nodes, weights = (FINE_NODES, FINE_WEIGHTS) if collocated else (NODES, WEIGHTS)
-    places = np.concatenate([rule[0], 0.5 * (nodes + 1.0)])
     low, width, within = ends[:-1], np.diff(ends), np.arange(len(ends) - 1)
+    span = float(t[-1] - t[0])
     step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
     found: list[float] = []
-    whole = np.nan
-    before = np.full(0, np.inf)
+    whole, before, asked = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0), dtype=np.bool_)
     for depth in range(HALVINGS):
-        times = low[:, None] + width[:, None] * places
+        times = low[:, None] + width[:, None] * rules.places
         fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
         at = np.stack([np.broadcast_to(step[:, None], fraction.shape), fraction], axis=-1)
-        value = integrand(at.reshape(-1, 2), np.repeat(within, len(places))).reshape(fraction.shape)
-        sums = width * np.einsum("ij,j->i", value[:, :count], rule[1])
-        better = 0.5 * width * np.einsum("ij,j->i", value[:, count:], weights)
-        if np.isnan(whole):
-            whole = float(np.abs(better).sum())
-            if max(whole, float(np.abs(sums).sum())) <= nothing * (t[-1] - t[0]):  # either may miss a pulse
-                break
+        value = integrands(at.reshape(-1, 2), np.repeat(within, len(rules.places))).reshape(*fraction.shape, -1)
+        sums = width[:, None] * np.einsum("ipr,p->ir", value, rules.own)
+        better = width[:, None] * np.einsum("ipr,p->ir", value, rules.better)
+        if depth == 0:
+            whole = np.abs(better).sum(axis=0)
+            either = np.maximum(whole, np.abs(sums).sum(axis=0))  # either may miss a pulse
+            asked = np.tile(either > nothing * span, (len(low), 1))
         off = np.abs(sums - better)
-        bad = (off > tolerance * whole) & (width > 2.0 * APART * (t[-1] - t[0]))
+        bad = asked & (off > tolerance * whole) & (width > 2.0 * APART * span)[:, None]
         if depth >= PATIENCE:  # what does not fall with its halves is rounding
-            pair = off.reshape(2, -1).sum(axis=0)
-            bad &= np.tile(pair <= VAIN * before, 2)
-        if not bad.any():
+            pair = off.reshape(2, -1, len(whole)).sum(axis=0)
+            bad &= np.tile(pair <= VAIN * before, (2, 1))
+        some = bad.any(axis=1)
+        if not some.any():
             break
-        before = off[bad]
-        half = 0.5 * width[bad]
-        found += (low[bad] + half).tolist()
-        low, width = np.concatenate([low[bad], low[bad] + half]), np.concatenate([half, half])
-        step, within = np.tile(step[bad], 2), np.tile(within[bad], 2)
+        before, asked = off[some], np.tile(bad[some], (2, 1))
+        half = 0.5 * width[some]
+        found += (low[some] + half).tolist()
+        low, width = np.concatenate([low[some], low[some] + half]), np.concatenate([half, half])
+        step, within = np.tile(step[some], 2), np.tile(within[some], 2)
     return found

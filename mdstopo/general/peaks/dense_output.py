@@ -7,7 +7,7 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.dynamics.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.model.bundles import bundle
-from mdstopo.general.model.general_model import SUBJECT, unpack_general
+from mdstopo.general.model.general_model import ORDER, SUBJECT, unpack_general
 from mdstopo.general.model.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.responses.general_responses import (
     APART,
@@ -17,7 +17,9 @@ from mdstopo.general.responses.general_responses import (
     group_rates,
     is_chosen,
     is_plain,
+    needs_balance,
     rated,
+    response,
 )
 from mdstopo.general.steps.method_interface import derivatives, is_continuous, is_explicit, point_of, state_at_offset
 from mdstopo.general.steps.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
@@ -150,7 +152,7 @@ def evaluate_here(tag, motion, j, k, c, who, rates, balanced, purpose):
 
 
 @entry
-def sample_response(
+def sample_responses(
     tag,
     ints,
     floats,
@@ -162,7 +164,7 @@ def sample_response(
     member_state,
     exact,
     rates,
-    j,
+    js,
     who,
     places,
     out_q,
@@ -171,7 +173,7 @@ def sample_response(
     seen,
     work,
 ):
-    """States, and values and rates of a response, at any places of a finished motion.
+    """States, and values and rates of responses, at any places of a finished motion.
 
     Constant:
       tag: the method of integration (`method_interface`).
@@ -183,17 +185,17 @@ def sample_response(
       room, room_ints: flat arrays of the history of steps (`carve_history`).
       exact: whether states inside steps are those of the method's own motion; else of the quintic through the
         coordinates, velocities and accelerations at both ends.
-      rates: whether rates are wanted; else, where response j needs no balance, there may be no a and lam_out either.
-      j: the response; below 0: none.
-      who: number of the member whose force is meant; -1: at each place the one with the largest force.
+      rates: whether rates are wanted; else, where no response needs a balance, there may be no a and lam_out either.
+      js (R,): the responses; none: states alone.
+      who (K, R): numbers of the members whose forces are meant; -1: of the one with the largest force there.
       places (K, 2): steps, and fractions of them; 0 and 1 are the states at the ends as they are in that step.
     In place:
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     Out:
-      out_q (K, n_q), out (2, K, n): coordinates, and velocities and accelerations.
+      out_q (K, n_q), out (2, K, n): coordinates, and velocities and accelerations; no rows: no states are wanted.
       lam_out (K, n_row + n_driven): multipliers of the solved rows, then those of the driven coordinates, what
         M a + Phi_q^T lam = F leaves to them.
-      seen (K, 3): value of the response, its rate (per s), number of the member.
+      seen (K, R, 3): values of the responses, their rates (per s), numbers of the members.
       work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
@@ -202,18 +204,25 @@ def sample_response(
     n_row = model.size[0]
     last = -1
     driven = model.driven.shape[0] > 0
+    needed = balance_of(model, js)
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
         last = go_to(tag, motion, k, c, exact, last)
-        seen[i, 0], seen[i, 1], seen[i, 2] = evaluate_here(tag, motion, j, k, c, who, rates, rates, OF_SAMPLES)
-        if driven and rates and j >= 0 and not follows_state(tag, model, j):  # the workspace is of a state beside it
+        if rates or js.shape[0] == 0:
+            _with_rates(tag, motion, js, k, c, who[i], rates, seen[i])
+        else:
+            _values(tag, motion, js, k, c, who[i], needed, seen[i])
+        # the workspace is of a state beside it
+        if driven and rates and js.shape[0] > 0 and not follows_state(tag, model, js[js.shape[0] - 1]):
             segment = history.index[k, SEGMENT]
             t = time_at(history, k, c)
             solve_accelerations(
                 model, member_state, segment, t, motion.q, motion.v, np.bool_(False), motion.workspace, motion.a,
                 motion.lam,
             )  # fmt: skip
+        if out_q.shape[0] == 0:
+            continue
         copy_vector(motion.q, out_q[i])
         copy_vector(motion.v, out[0, i])
         copy_vector(motion.a, out[1, i])
@@ -222,6 +231,65 @@ def sample_response(
             d = model.driven[m]
             force = motion.workspace.f[d] - model.mass[d] * motion.a[d]
             lam_out[i, n_row + m] = force - held_back(model, motion.workspace, d, motion.a, motion.lam)
+
+
+#: what values of responses take beyond the state: nothing, accelerations, all that a balance leaves
+NOTHING, ACCELERATIONS, BALANCE = range(3)
+
+
+@kernel
+def balance_of(model, js):
+    """What the values of responses js (R,) take, beyond the state, of all that any of them takes."""
+    needed = NOTHING
+    for j in js:
+        if needs_balance(model, j):
+            return BALANCE
+        if model.response[j, ORDER] > 1:
+            needed = ACCELERATIONS
+    return needed
+
+
+@kernel
+def _with_rates(tag, motion, js, k, c, who, rates, seen):
+    """Values, rates and members of responses at the state of the motion: as `sample_responses` has them.
+
+    tag: the method of integration (`method_interface`). motion: the finished motion.
+    js (R,), who (R,): the responses, and the members whose forces are meant; without any only the balance is made.
+    k, c: the step, and the fraction of it. rates: whether rates are wanted. seen (R, 3): out.
+    """
+    if js.shape[0] == 0:
+        evaluate_here(tag, motion, np.int64(-1), k, c, np.int64(-1), rates, rates, OF_SAMPLES)
+    for r in range(js.shape[0]):
+        seen[r, 0], seen[r, 1], seen[r, 2] = evaluate_here(
+            tag, motion, js[r], k, c, who[r], rates, rates, OF_SAMPLES
+        )  # fmt: skip
+
+
+@kernel
+def _values(tag, motion, js, k, c, who, needed, seen):
+    """Values and members of responses at the state of the motion, of which one balance serves all; rates are 0.
+
+    tag: the method of integration (`method_interface`). motion: the finished motion.
+    js (R,), who (R,): the responses, and the members whose forces are meant. k, c: the step, and the fraction of it.
+    needed: what they take of a balance (`balance_of`). seen (R, 3): out.
+    """
+    model, member_state, workspace = motion.model, motion.member_state, motion.workspace
+    q, v, a, lam = motion.q, motion.v, motion.a, motion.lam
+    segment, t = motion.history.index[k, SEGMENT], time_at(motion.history, k, c)
+    if needed == ACCELERATIONS and (c <= 0.0 or c >= 1.0):
+        balance_at_end(tag, motion, k, 1 if c >= 1.0 else 0, q, v, a)
+    elif needed != NOTHING:
+        solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
+        motion.work[FORCES] += 1
+        motion.work[OF_SAMPLES] += 1
+    for r in range(js.shape[0]):
+        j = js[r]
+        part = chosen_part(model, member_state, segment, j, who[r], t, q, v, a, lam, workspace)
+        seen[r, 0] = response(
+            model, member_state, segment, j, part, t, q, v, a, lam, workspace, motion.bars, motion.row_bar
+        )
+        seen[r, 1] = 0.0
+        seen[r, 2] = part
 
 
 @entry
@@ -238,7 +306,7 @@ def compare(
     In:
       count: number of steps.
       room, room_ints: flat arrays of the history of steps (`carve_history`).
-      exact: whether states inside steps are those of the method's own motion; else of a quintic (`sample_response`).
+      exact: whether states inside steps are those of the method's own motion; else of a quintic (`sample_responses`).
       j: the response, which says which group.
       places (K, 2): steps, and fractions of them.
       who (C,): numbers within the group of the members whose forces and rates are wanted; without any no rates are

@@ -1,7 +1,7 @@
 """The rows of one response with their gradients in one call: all that most evaluations need.
 
 Rows are its peaks, or its value at the end. The call does what `peak_search.peaks_of_steps`, or
-`dense_output.sample_response` at the end, and then `row_sweep.rows_vjp` of the rows that were found do.
+`dense_output.sample_responses` at the end, and then `row_sweep.rows_vjp` of the rows that were found do.
 """
 
 import numpy as np
