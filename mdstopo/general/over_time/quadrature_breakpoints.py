@@ -9,6 +9,7 @@ computed once more with steps that end at these middles; since steps between the
 Steps of fixed length promise no accuracy, and stay as they are.
 """
 
+import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -33,9 +34,13 @@ ROUNDS = 3
 #: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
 #: tolerances). It costs little, because one halving more lowers the difference by hundreds
 SHARE = 1e-3
-#: halvings of one step at most; after PATIENCE of them a step is given up where one more leaves a larger share of the
-#: difference than VAIN: what is left is rounding
-HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
+#: halvings of one step at most; after PATIENCE of them, and once a run has at least RESOLVED parts, a step is given up
+#: where one more leaves a larger share of the difference than VAIN: what is left is rounding. In fewer parts it may be
+#: an integrand that oscillates within them, as one of a load that the motion does not feel
+HALVINGS, PATIENCE, VAIN, RESOLVED = 24, 3, 0.7, 256
+#: how much of an earlier difference counts after one more halving: beside a kink one may be small by chance, and
+#: differences fall to a quarter
+FADES = 0.25
 #: a response that is smaller by this at both ends of a step than in its middle, in this share of all steps, is zero in
 #: truth: joints hold it there, which states keep to and what is between them misses
 MISSED, MOSTLY = 1e-3, 0.75
@@ -195,6 +200,7 @@ def halves(
     found: list[float] = []
     whole = np.nan
     before = np.full(0, np.inf)
+    patience = max(PATIENCE, math.ceil(math.log2(RESOLVED / len(low))))
     for depth in range(HALVINGS):
         times = low[:, None] + width[:, None] * places
         fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
@@ -208,12 +214,12 @@ def halves(
                 break
         off = np.abs(sums - better)
         bad = (off > tolerance * whole) & (width > 2.0 * APART * (t[-1] - t[0]))
-        if depth >= PATIENCE:  # what does not fall with its halves is rounding
+        if depth >= patience:  # what does not fall with its halves is rounding
             pair = off.reshape(2, -1).sum(axis=0)
             bad &= np.tile(pair <= VAIN * before, 2)
         if not bad.any():
             break
-        before = off[bad]
+        before = np.maximum(off, FADES * np.tile(before, 2))[bad] if depth else off[bad]
         half = 0.5 * width[bad]
         found += (low[bad] + half).tolist()
         low, width = np.concatenate([low[bad], low[bad] + half]), np.concatenate([half, half])
