@@ -48,6 +48,9 @@ def command(source: Path, body: str, unit: str | None, fix: bool, out: Path | No
 
         content, told = robot_in(source, data, fix)
     else:
+        if fix:
+            message = f"{source} has points, which have no body to hold; --fix is for robots ({', '.join(_ROBOTS)})"
+            raise click.BadParameter(message, param_hint="--fix")
         content, told = _points(source, data, body, unit)
     text = text_of(content)
     if source.suffix.lower() in _ROBOTS:

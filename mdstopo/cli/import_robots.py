@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.geometry.start_rotations import about_axis
 from mdstopo.cli.import_points import ImportedError, mistakes_in
+from mdstopo.shown import counted
 
 Floats = NDArray[np.float64]
 Plain = dict[str, Any]
@@ -185,6 +186,13 @@ def _urdf(root: Xml.Element, path: Path, fixed: bool) -> Tree:
     top = tops[0]
     held = "ground" if walk.part(top, Frame()).mass == 0.0 else None
     walk.link(top, Frame(), held)
+    shapes = [
+        counted(len(root.findall(f"link/{each}")), each)
+        for each in ("visual", "collision")
+        if root.find(f"link/{each}") is not None
+    ]
+    if shapes:
+        tree.tell(f"shapes are left out ({', '.join(shapes)}): write an `outline` for bodies to be drawn by")
     if held is None and fixed:
         body = next(iter(tree.bodies))
         tree.joints.insert(0, {"type": "fixed", "bodies": ["ground", body], "at": _plain(tree.bodies[body].centre)})

@@ -5,7 +5,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.plots.beside import side_places
-from mdstopo.plots.member_lines import NARROWEST, add_lines, widest_of
+from mdstopo.plots.layout_plot import COLUMNS
+from mdstopo.plots.legend import SETTING, columns_of, height_of, legend_handles, legend_names
+from mdstopo.plots.member_lines import NARROWEST, add_lines, legend_title, widest_of
 from mdstopo.plots.panels import ABOVE, BELOW, LEFT, RIGHT, add_panel, fitted
 from mdstopo.plots.same_members import same_members
 from mdstopo.plots.scenery import start_state
@@ -40,13 +42,19 @@ def draw(module: Any, source: Source) -> Any:
 def draw_pair(module: Any, first: Source, second: Source, titles: tuple[str, str]) -> Any:
     """Both designs, and below them the members of which there is more in the one or in the other.
 
-    Widths are relative to the largest of both designs, where they show the same of both.
+    Widths are relative to the largest of both designs, where they show the same of both. A legend stands above each
+    design; one is enough where both have the same groups.
     """
     stages = [Stage(source, start_state(source.case)[None]) for source in (first, second)]
     if first.case.dimension == second.case.dimension:  # what is compared has one scale
         Stage.show_alike(stages)
-    figure, axes, inches = _panels(module, stages, 2)
     thick = alike(first, second)
+    names = [legend_names(stage.case) for stage in stages]
+    titled = [legend_title(stage.case, own) for stage, own in zip(stages, thick, strict=True)]
+    heights = [
+        height_of(len(own), columns_of(own, WIDTH, COLUMNS), told) for own, told in zip(names, titled, strict=True)
+    ]
+    figure, axes, inches = _panels(module, stages, 2, max(heights))
     for axis, stage, own, title in zip(axes[0], stages, thick, titles, strict=True):
         stage.draw(axis, start_state(stage.case), own, (None, None), inches)
         axis.set_title(title, loc="left")
@@ -61,15 +69,31 @@ def draw_pair(module: Any, first: Source, second: Source, titles: tuple[str, str
     ):
         _more(axis, stage, own, rise, inches)
         axis.set_title(title, loc="left")
+    _add_legends(figure, axes[0], titled, names[0] == names[1] and titled[0] == titled[1])
     return figure
 
 
-def _panels(module: Any, stages: list[Stage], rows: int) -> tuple[Any, list[list[Any]], Floats]:
-    """A figure, rows of two drawings as high as what is seen needs, and their size in inches (2,)."""
+def _add_legends(figure: Any, axes: list[Any], titles: list[str | None], same: bool) -> None:
+    """Add what the colours of two drawings mean, above each, or above the first where it is the same of both.
+
+    axes: the drawings. titles: of their legends.
+    """
+    for k, (axis, title) in enumerate(zip(axes[: 1 if same else 2], titles, strict=False)):
+        handles, labels = legend_handles(axis)
+        columns = columns_of(labels, WIDTH, COLUMNS)
+        beside = {"loc": "upper left", "bbox_to_anchor": (0.5 * k, 1.0), "ncols": columns, "title": title}
+        figure.legend(handles, labels, **beside, **SETTING)
+
+
+def _panels(module: Any, stages: list[Stage], rows: int, above: float = 0.0) -> tuple[Any, list[list[Any]], Floats]:
+    """A figure, rows of two drawings as high as what is seen needs, and their size in inches (2,).
+
+    above: inches that are free above all of them.
+    """
     most = np.array([WIDTH - LEFT - RIGHT, HIGHEST])
     inches = np.max([fitted(stage.window(most), most) for stage in stages], axis=0)
     high = float(inches[1]) + BELOW + ABOVE
-    figure = module.Figure(figsize=(2.0 * WIDTH, rows * high))
+    figure = module.Figure(figsize=(2.0 * WIDTH, rows * high + above))
     places = [[(k * WIDTH + LEFT, (rows - 1 - row) * high + BELOW) for k in range(2)] for row in range(rows)]
     return figure, [[add_panel(figure, x, y, inches) for x, y in row] for row in places], inches
 

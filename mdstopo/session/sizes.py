@@ -48,6 +48,8 @@ class Sizes:
         self._before: ResultView | None = None
         self._continuous = float("nan")
         self._kept = 0
+        #: evaluations of a search before, which has found nothing
+        self._spent = 0
 
     def refuse(self) -> None:
         """Refuse what no sizes can be chosen for. Raises CaseError."""
@@ -100,8 +102,42 @@ class Sizes:
         keep: called whenever there is something to save.
         notify: is given sentences for the user.
         """
-        held, catalogued = self._held(problem, state.best_alpha)
-        self._continuous, self._kept = float(state.best_objective), len(catalogued.place)
+        self._continuous = float(state.best_objective)
+        everyone = self._was_everyone()
+        progress = self._searched(problem, state, everyone, stop, keep, notify)
+        some = 0 < self._kept < len(self._groups_at())
+        if progress.finished and progress.x is None and some and not everyone:
+            notify(f"no choice of sizes of these {self._kept} keeps the constraints; the others may have sizes, too")
+            self._before, self._spent = None, progress.evaluations
+            progress = self._searched(problem, state, True, stop, keep, notify)
+        if (not progress.finished and stop()) or progress.x is None:
+            return state
+        return self._end(problem, state, progress.x, progress)
+
+    def _was_everyone(self) -> bool:
+        """Whether an earlier process has come to choose sizes of all members."""
+        if self._before is None:
+            return False
+        with _whole(self._before):
+            return len(self._before.under(SEARCH)["place"]) == len(self._groups_at())
+
+    def _searched(
+        self,
+        problem: Problem,
+        state: State,
+        everyone: bool,
+        stop: Callable[[], bool],
+        keep: Callable[[], None],
+        notify: Callable[[str], None],
+    ) -> SearchProgress:
+        """Search for sizes of the members that are kept; how far it has come.
+
+        problem: that of the last stage. state: the continuous optimum.
+        everyone: whether all members are kept.
+        stop, keep, notify: as of `choose`.
+        """
+        held, catalogued = self._held(problem, state.best_alpha, everyone)
+        self._kept = len(catalogued.place)
         search = SizeSearch(held, catalogued, held.initial, self._solve, self.case.optimizer.tolerance)
         self._search = search
         if self._before is not None:
@@ -109,7 +145,6 @@ class Sizes:
                 search.restore(self._before.under(SEARCH))
         of = count_text(sum(len(group) for group in self.case.design_groups if group.sizes))
         notify(f"choosing sizes of {self._kept} members of {of}, {count_text(catalogued.choices)} choices")
-
         said_at = time.monotonic()
 
         def save(progress: SearchProgress) -> None:
@@ -126,9 +161,7 @@ class Sizes:
 
         progress = search.run(stop, save, say)
         self.outcome = self._outcome(progress, catalogued)
-        if (not progress.finished and stop()) or progress.x is None:
-            return state
-        return self._end(problem, state, progress.x, progress)
+        return progress
 
     def _end(self, problem: Problem, state: State, x: Floats, progress: SearchProgress) -> State:
         """The last state of a run: of the choice x (n,), behind that of the continuous optimum."""
@@ -144,8 +177,8 @@ class Sizes:
         last.history.constraints[-1] = rows.excess(space.reduce(at_prices(self.case, design)))
         for row in last.history.info.get("constraints", [])[-1:]:
             row[:] = excess_at_prices(self.case, design, row)
-        last.evaluations += progress.evaluations
-        last.history.evaluations[-1] += progress.evaluations
+        last.evaluations += self._spent + progress.evaluations
+        last.history.evaluations[-1] += self._spent + progress.evaluations
         # a choice is no optimum of numbers: no residual tells how far it is from one
         last.kkt = last.history.kkt[-1] = float("nan")
         last.status = RunStatus.CONVERGED if progress.finished else RunStatus.MAX_ITERATIONS
@@ -191,16 +224,16 @@ class Sizes:
         """-1 where the objective is to be maximised, and so U is its negative."""
         return -1.0 if self.case.objectives[0].sense == "maximize" else 1.0
 
-    def _held(self, problem: Problem, x: Floats) -> tuple[Within, Catalogued]:
+    def _held(self, problem: Problem, x: Floats, everyone: bool) -> tuple[Within, Catalogued]:
         """The problem with members that are not kept at their least size and its price, and the variables of the
-        others."""
+        others. everyone: whether all members are kept."""
         lower, upper, begin = problem.lower.copy(), problem.upper.copy(), x.copy()
         # rows have the sizes of members that are held: what their prices are above these is spent before
         rows, dearer = problem.linear, np.zeros(len(x))
         kept = []
         for place, group in self._groups_at().items():
             least = next((size for size in group.sizes if size > 0.0), np.inf)  # none: all are 0, and no member is kept
-            if x[place] < KEPT * least:
+            if not everyone and x[place] < KEPT * least:
                 lower[place] = upper[place] = begin[place] = group.sizes[0]
                 dearer[place] = group.prices[0] - group.sizes[0]
             else:

@@ -101,7 +101,7 @@ ONE = [
     ("equals: 3", "equals: 3, limit: 4", "{volume", "constraints[0]", ["limit and equals", "exactly one"]),
     (", equals: 3", "", "{volume", "constraints[0]", ["exactly one of limit"]),
     ("volume: all", "volume: [belts, belts]", "belts]", "constraints[0].volume[1]", ["already"]),
-    ("volume: all", "volume: al", "al,", "constraints[0].volume", ["'al'", "belts"]),
+    ("volume: all", "volume: al", "al,", "constraints[0].volume", ["'al', did you mean 'all'? there are belts", "all"]),
     ("equals: 3", "equals: 3, over_time: max", "max}", "constraints[0].over_time", ["'response'"]),
     ("equals: 3", "fraction: 1.2", "1.2", "constraints[0].fraction", ["1.2", "<= 1"]),
     ("volume: all, equals: 3", "response: energy, fraction: 0.3", "0.3}", "constraints[0].fraction", ["'volume'"]),

@@ -120,6 +120,9 @@ def test_tables_are_points_with_names_or_without() -> None:
         ("a.txt", "x\ty\n1\t\t2\n", {"a": [(1, 2)]}),
         ("a.csv", "east,north\n5,6\n", {"a": [(5, 6)]}),
         ("a.csv", "Points of the rim\n5,6,7\n", {"a": [(5, 6, 7)]}),
+        ("a.csv", "x;y # in metres, from the left\n5;6 # the rim, new\n", {"a": [(5, 6)]}),
+        ("a.txt", "5 6 # the rim, new; and round\n7 8\n", {"a": [(5, 6), (7, 8)]}),
+        ("a.csv", '"x";"y"\n5;6\n', {"a": [(5, 6)]}),
     ],
 )
 def test_the_line_of_names_says_which_columns_are_coordinates(name: str, text: str, layers: dict[str, Any]) -> None:
@@ -138,7 +141,11 @@ def test_the_line_of_names_says_which_columns_are_coordinates(name: str, text: s
         ("a.csv", "x;y\n7;1;2\n", "line 2: found 7;1;2, which has 3 cells; the line of names has 2"),
         ("a.txt", "x y nr\n5 6 1\n6 2\n", "line 3: found 6 2, which has 2 cells; the line of names has 3"),
         ("a.csv", "nr,east,north\n1,5,6\n", "line 2: found 1, 5, 6 in columns called nr, east, north, which may be"),
-        ("a.csv", f'x,y,note\n1,2,"{"a" * 140000}"\n', "line 2: a cell cannot be read: field larger than"),
+        (
+            "a.csv",
+            f'x,y,note\n1,2,"{"a" * 140000}"\n',
+            "line 2: a cell in quotation marks cannot be read: field larger than",
+        ),
         ("a.dxf", "hello\nworld\n", "this is no DXF"),
         ("a.svg", "<svg", "this is no SVG"),
         ("a.svg", '<svg><g id="k" transform="scale(2)"><line/></g></svg>', "'k' has a transform"),
@@ -328,3 +335,24 @@ def test_what_of_a_robot_no_case_can_have_is_told_when_it_is_written(
     Path("right.urdf").write_text(ARM, encoding="utf-8")
     assert run_group(["import", "right.urdf", "--out", "right.yaml"]) == 0
     assert "to be mended" not in capsys.readouterr().err
+
+
+def test_points_cannot_be_held(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """--fix did nothing to points, without a word."""
+    monkeypatch.chdir(tmp_path)
+    Path("rim.csv").write_text("x,y\n1,2\n", encoding="utf-8")
+    assert run_group(["import", "rim.csv", "--fix", "--out", "rim.yaml"]) == 2
+    assert (
+        "rim.csv has points, which have no body to hold; --fix is for robots (.urdf, .xml)" in capsys.readouterr().err
+    )
+    assert not Path("rim.yaml").exists()
+
+
+def test_shapes_of_a_robot_that_are_left_out_are_counted() -> None:
+    shape = '<visual><geometry><box size="1 1 1"/></geometry></visual>'
+    text = ARM.replace('<link name="base"/>', f'<link name="base">{shape}{shape}<collision/></link>')
+    sentence = "shapes are left out (2 visuals, 1 collision): write an `outline` for bodies to be drawn by"
+    assert sentence in robot_in(Path("arm.urdf"), text)[1]
+    assert not any("shapes" in each for each in robot_in(Path("arm.urdf"), ARM)[1])

@@ -672,3 +672,33 @@ def test_a_vector_that_passes_zero_has_its_direction_on_either_side_at_any_toler
         found = evaluate(read_case(ARM, overrides={"solver.tolerance": tolerance}), alpha).gradients["F"]
         assert np.abs(found - exact).max() <= 10.0 * tolerance * np.abs(exact).max()
     assert exact == pytest.approx(differences(read_case(ARM), "F", alpha, 1e-3), rel=1e-6)
+
+
+#: a body on a slider, pushed across it: its motion does not feel the push, so that one step may be the whole motion
+PUSHED = """
+format: 1
+time: {end: END}
+bodies: {a: {mass: 1, inertia: 1, position: [0, 0], velocity: [0.3, 0]}}
+joints: [JOINT]
+loads: [{body: a, force: [0, "sin(7*t)"]}]
+objectives: {F: {response: {joint_force: {joint: p}}, over_time: OVER}}
+solver: {tolerance: TOL, integrator: runge_kutta}
+"""
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("end", [3.0, 30.0])
+@pytest.mark.parametrize("joint", ["prismatic", "fixed"])
+def test_the_mean_size_of_a_force_that_passes_zero_many_times_in_a_step_follows_the_tolerance(joint, end, tolerance):
+    stated = f"{{name: p, type: {joint}, bodies: [ground, a], at: [0, 0]"
+    stated += ", axis: [1, 0]}" if joint == "prismatic" else "}"
+    text = (
+        PUSHED.replace("END", str(end)).replace("JOINT", stated).replace("OVER", "mean").replace("TOL", f"{tolerance}")
+    )
+    if joint == "fixed":
+        text = text.replace(", velocity: [0.3, 0]", "")
+    # |sin| has the integral 2 over each half period, and 1 - cos over what is left of the last one
+    halves, left = divmod(7.0 * end, np.pi)
+    exact = (2.0 * halves + 1.0 - np.cos(left)) / 7.0 / end
+    found = evaluate(read_case(text), gradient=False).objectives["F"]
+    assert found == pytest.approx(exact, rel=max(3.0 * tolerance, 1e-11))

@@ -102,3 +102,90 @@ def test_only_those_share_that_are_the_largest():
     text = TIED.replace("LAW", "{type: table, table: [[0, 1], [1, 3]]}")
     found = evaluate(read_case(text), np.array([0.6, 0.5, 0.6]))
     assert found.gradients["MEAN"] == pytest.approx([1.0, 0.0, 1.0], rel=1e-9)
+
+
+#: a driven body with many springs to the ground, whose forces are 3 and what the way to each anchor has become longer
+MANY = """
+format: 1
+time: {end: 2}
+bodies: {a: {mass: 1, inertia: 1, position: [0, 0]}}
+motions: [{body: a, x: {velocity: 1}, y: {velocity: 0}, angle: {velocity: 0}}]
+points:
+  anchors: {body: ground, grid: {list: ANCHORS}}
+  pads: {body: a, grid: {list: PADS}}
+members:
+  g: {from: anchors, to: pads, connect: pairs, law: {type: spring, stiffness: 1, preload: 3}}
+design: {initial: 1}
+objectives:
+  MEAN: {response: {member_force: {group: g}}, over_time: mean}
+  RMS: {response: {member_force: {group: g}}, over_time: rms}
+combine: {weights: {MEAN: 1, RMS: 1}}
+solver: {tolerance: 1e-9}
+"""
+
+
+def many(count, seed):
+    """A case of that many members, and their forces (count, K) at times (K,) by alpha = 1."""
+    rng = np.random.default_rng(seed)
+    far = rng.uniform(0.5, 3.0, count) * np.where(rng.random(count) < 0.5, -1.0, 1.0)
+    anchors = np.round(np.column_stack([far, rng.normal(size=count)]), 4)
+    text = MANY.replace("ANCHORS", str(anchors.tolist())).replace("PADS", str([[0, 0]] * count))
+
+    def forces(t):
+        way = np.hypot(anchors[:, :1] - t, anchors[:, 1:])
+        return way - np.hypot(anchors[:, :1], anchors[:, 1:]) + 3.0
+
+    return read_case(text), forces
+
+
+@pytest.mark.parametrize(("count", "spread"), [(15, 0.1), (60, 1e-3), (300, 1e-5)])
+def test_however_many_members_come_near_the_largest_force_all_that_lead_are_found(count, spread):
+    """A fine sum over the largest of the forces in closed form is the same, and so is each member's share of it."""
+    case, forces = many(count, seed=count)
+    # all are about the same after 1 s, where most of them change their place
+    alpha = 3.0 / forces(np.ones(1))[:, 0] * (1.0 + spread * np.random.default_rng(1).uniform(-1.0, 1.0, count))
+    found = evaluate(case, alpha)
+    ends = np.linspace(0.0, 2.0, 20001)
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    t = (0.5 * (ends[1:] + ends[:-1])[:, None] + 0.5 * np.diff(ends)[:, None] * nodes).ravel()
+    w = np.tile(0.5 * weights, 20000) * 1e-4
+    plain = forces(t)
+    size = np.abs(alpha[:, None] * plain)
+    who, most = size.argmax(axis=0), size.max(axis=0)
+    share = np.bincount(who, w * np.abs(plain[who, np.arange(len(t))]), minlength=count) / 2.0
+    assert len(np.unique(who)) > 2
+    assert found.objectives["MEAN"] == pytest.approx(0.5 * w @ most, rel=2e-9)
+    assert found.objectives["RMS"] == pytest.approx(np.sqrt(0.5 * w @ most**2), rel=2e-9)
+    assert found.gradients["MEAN"] == pytest.approx(share, abs=1e-4)
+
+
+#: fifteen springs of one slider, all of whose forces vanish at the same times
+SLIDER = """
+format: 1
+time: {end: 3}
+bodies: {a: {mass: 1, inertia: 1, position: [0, 0], velocity: [1, 0]}}
+joints: [{name: p, type: prismatic, bodies: [ground, a], at: [0, 0], axis: [1, 0]}]
+points:
+  p: {body: ground, grid: {list: P}}
+  q: {body: a, grid: {list: Q}}
+members: {g: {from: p, to: q, connect: pairs, law: {type: spring, stiffness: 9}}}
+design: {initial: 0.5}
+objectives: {F: {response: {member_force: {group: g}}, over_time: rms}}
+"""
+
+
+def test_all_pairs_of_members_are_searched_together(monkeypatch):
+    """Each pair by itself took thousands of calls of a kernel from Python; here their number is that of iterations."""
+    from mdstopo.general.over_time import leading_members
+
+    places = np.random.default_rng(5).uniform(-1.0, 1.0, (15, 2)).round(3)
+    case = read_case(SLIDER.replace("P", str((places + 2.0).tolist())).replace("Q", str(places.tolist())))
+    calls, compare = [], leading_members.compare
+
+    def counted(*arguments):
+        calls.append(len(arguments[2]))
+        return compare(*arguments)
+
+    monkeypatch.setattr(leading_members, "compare", counted)
+    evaluate(case, np.random.default_rng(0).uniform(0.2, 1.0, 15), gradient=False)
+    assert 3 < len(calls) < 80

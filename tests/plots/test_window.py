@@ -383,6 +383,27 @@ def test_two_designs_are_as_wide_as_they_are_beside_each_other(largest: float) -
     assert sum(drawn) == 3
 
 
+@pytest.mark.parametrize(("other", "legends"), [("belts", 1), ("ropes", 2)])
+def test_a_picture_of_two_designs_names_the_groups_of_each(other: str, legends: int) -> None:
+    """Colours go by the place of a group in its own case, so that two cases may need two legends; they had none."""
+    from mdstopo.plots.designs_plot import draw_pair
+    from mdstopo.plots.style import colour, styled
+
+    text = EDGES + "objectives: {G: {response: energy}}\nconstraints: [{volume: all, fraction: 0.5}]\n"
+    both = [source_of(text), source_of(text.replace("belts:", f"{other}:"))]
+    with styled() as module:
+        figure = draw_pair(module, *both, ("first", "second"))
+        first = colour(0)
+    assert len(figure.legends) == legends
+    for legend, source in zip(figure.legends, both, strict=False):
+        names = [each.get_text() for each in legend.get_texts()]
+        groups = [group.name for group in source.case.members]
+        assert [name for name in names if name in groups] == groups
+        line = legend.get_lines()[names.index(groups[0])]
+        assert matplotlib.colors.to_rgba(line.get_color()) == matplotlib.colors.to_rgba(first)
+        assert legend.get_window_extent().y0 > max(axis.get_window_extent().y1 for axis in figure.axes)
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_the_colour_of_differences_is_told_from_paper_ink_and_groups(dark: bool) -> None:
     """Farther from each, in sRGB, than a quarter of the way from black to white."""

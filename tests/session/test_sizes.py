@@ -290,3 +290,39 @@ def test_a_choice_that_is_better_than_the_continuous_optimum_is_told_as_better()
     assert outcome.sizes.objective < outcome.sizes.continuous
     gain = (outcome.sizes.continuous - outcome.sizes.objective) / outcome.sizes.continuous
     assert outcome.reason.endswith(f"{gain:.3%} better than the continuous optimum")
+
+
+#: two springs, one along each axis; that along y is hardly needed, and not at all dispensable
+CROSSED = """
+format: 1
+time: {end: 1}
+bodies: {a: {mass: 1, inertia: 1, position: [0, 0]}}
+members:
+  x: {from: {body: ground, at: [-5, 0]}, to: {body: a, at: [0, 0]}, law: {type: spring, stiffness: 40, damping: 2}}
+  y: {from: {body: ground, at: [0, -5]}, to: {body: a, at: [0, 0]}, law: {type: spring, stiffness: 40, damping: 2}}
+loads: [{body: a, force: [4, 0.5]}]
+design: {initial: 0.5, lower: 0, catalogue: {x: [0, 0.4, 0.7, 1], y: [0, 0.4, 1]}}
+objectives: {X: {response: {displacement: {body: a, component: x}}, over_time: max}}
+constraints:
+  - {response: {displacement: {body: a, component: y}}, over_time: max, limit: 0.18}
+  - {volume: all, limit: 1.15}
+solver: {tolerance: 1e-8}
+"""
+
+
+def test_members_that_are_next_to_nothing_get_a_size_where_without_them_a_limit_is_broken(tmp_path):
+    """The run ended as failed: the spring along y has a size below half of 0.4, and was left out."""
+    case = read_case(CROSSED)
+    without = run_session(replace(case, members=tuple(replace(group, sizes=()) for group in case.members)))
+    assert 0.01 < without.alpha[1] < 0.2
+    said = []
+    outcome = run_session(case, notify=said.append)
+    assert outcome.status is RunStatus.CONVERGED
+    evaluator, best = Evaluator(case), {}
+    for choice in itertools.product([0.0, 0.4, 0.7, 1.0], [0.0, 0.4, 1.0]):
+        found = evaluator.evaluate(np.array(choice), gradient=False)
+        if found.constraints.max() <= 1e-9:
+            best[found.objectives["X"]] = list(choice)
+    assert outcome.alpha.tolist() == best[min(best)] == [0.7, 0.4]
+    assert outcome.sizes.members == 2
+    assert any("no choice of sizes of these 1 keeps the constraints" in each for each in said)

@@ -318,7 +318,7 @@ class Ref(Value):
             return BAD
         if value not in self.also:
             reading.mark(path, node)
-            reading.references.append(Reference(path, self.kind, value))
+            reading.references.append(Reference(path, self.kind, value, self.also))
         return value
 
     def schema(self) -> Schema:

@@ -52,11 +52,13 @@ def is_good(value: Any) -> bool:
 
 
 class Reference(NamedTuple):
-    """A name that must be declared: `kind` is body, point grid, member group, joint, load case, objective."""
+    """A name that must be declared: `kind` is body, point grid, member group, joint, load case, objective. also: words
+    that may stand in its place."""
 
     path: str
     kind: str
     name: str
+    also: tuple[str, ...] = ()
 
 
 class Reading:
@@ -133,9 +135,11 @@ class Reading:
     def check_references(self) -> None:
         """Check that every reference names something that is declared; else note a mistake, with the nearest right
         word."""
-        for path, kind, name in self.references:
+        for path, kind, name, also in self.references:
             if not self.knows(kind, name) and len(self.mistakes) < MOST_MISTAKES:
                 names = self.names(kind)
+                if names and kind != "load case":  # `default` is for cases that name no load case
+                    names = [*names, *also]
                 there = f"there are {listed(names)}" if names else f"the case has no {kind}"
                 hint = did_you_mean(name, names) or ";"
                 self.mistake(path, f"no {kind} is called {shown(name)}{hint} {there}")

@@ -9,6 +9,7 @@ agree. The motion is computed once more with steps that end at these middles; si
 all is checked again. Steps of fixed length promise no accuracy, and stay as they are.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -32,9 +33,13 @@ ROUNDS = 3
 #: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
 #: tolerances). It costs little, because one halving more lowers the difference by hundreds
 SHARE = 1e-3
-#: halvings of one step at most; after PATIENCE of them a step is given up where one more leaves a larger share of the
-#: difference than VAIN: what is left is rounding
-HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
+#: halvings of one step at most; after PATIENCE of them, and once a run has at least RESOLVED parts, a step is given up
+#: where one more leaves a larger share of the difference than VAIN: what is left is rounding. In fewer parts it may be
+#: an integrand that oscillates within them, as one of a load that the motion does not feel
+HALVINGS, PATIENCE, VAIN, RESOLVED = 24, 3, 0.7, 256
+#: how much of an earlier difference counts after one more halving: beside a kink one may be small by chance, and
+#: differences fall to a quarter
+FADES = 0.25
 #: a response that is smaller by this at both ends of a step than in its middle, in this share of all steps, is zero in
 #: truth: joints hold it there, which states keep to and what is between them misses
 MISSED, MOSTLY = 1e-3, 0.75
@@ -197,6 +202,7 @@ def halves(
     step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
     found: list[float] = []
     whole, before, asked = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0), dtype=np.bool_)
+    patience = max(PATIENCE, math.ceil(math.log2(RESOLVED / len(low))))
     for depth in range(HALVINGS):
         times = low[:, None] + width[:, None] * rules.places
         fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
@@ -210,13 +216,14 @@ def halves(
             asked = np.tile(either > nothing * span, (len(low), 1))
         off = np.abs(sums - better)
         bad = asked & (off > tolerance * whole) & (width > 2.0 * APART * span)[:, None]
-        if depth >= PATIENCE:  # what does not fall with its halves is rounding
+        if depth >= patience:  # what does not fall with its halves is rounding
             pair = off.reshape(2, -1, len(whole)).sum(axis=0)
             bad &= np.tile(pair <= VAIN * before, (2, 1))
         some = bad.any(axis=1)
         if not some.any():
             break
-        before, asked = off[some], np.tile(bad[some], (2, 1))
+        before = np.maximum(off, FADES * np.tile(before, (2, 1)))[some] if depth else off[some]
+        asked = np.tile(bad[some], (2, 1))
         half = 0.5 * width[some]
         found += (low[some] + half).tolist()
         low, width = np.concatenate([low[some], low[some] + half]), np.concatenate([half, half])
