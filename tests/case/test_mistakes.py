@@ -100,6 +100,7 @@ ONE = [
     ("equals: 3", "fraction: 1e-9", "1e-9", "constraints[0].fraction", ["lower"]),
     ("equals: 3", "equals: 3, limit: 4", "{volume", "constraints[0]", ["limit and equals", "exactly one"]),
     (", equals: 3", "", "{volume", "constraints[0]", ["exactly one of limit"]),
+    ("equals: 3", "at_most: 3", "at_most", "constraints[0].at_most", ["'at_most': an upper bound is `limit`"]),
     ("volume: all", "volume: [belts, belts]", "belts]", "constraints[0].volume[1]", ["already"]),
     ("volume: all", "volume: al", "al,", "constraints[0].volume", ["'al', did you mean 'all'? there are belts", "all"]),
     ("equals: 3", "equals: 3, over_time: max", "max}", "constraints[0].over_time", ["'response'"]),

@@ -253,6 +253,16 @@ COMBINE = Record(
     doc="How several objectives become one.",
 )
 SENSES = ("limit", "fraction", "equals", "at_least")
+#: other words for bounds, and which key is meant
+_BOUNDS = {
+    "at_most": "an upper bound is `limit`",
+    "maximum": "an upper bound is `limit`",
+    "max": "an upper bound is `limit`",
+    "upper": "an upper bound is `limit`",
+    "minimum": "a lower bound is `at_least`",
+    "min": "a lower bound is `at_least`",
+    "lower": "a lower bound is `at_least`",
+}
 CONSTRAINT = Record(
     "a constraint",
     (
@@ -276,6 +286,7 @@ CONSTRAINT = Record(
     one_of=(("volume", "response"), SENSES),
     needs=(("over_time", "response"), ("load_case", "response"), ("fraction", "volume")),
     doc="A bound on a volume or on a response. Bounds on a response are in its own unit.",
+    elsewhere=tuple(_BOUNDS.items()),
     unit_of=unit_stated,
 )
 
