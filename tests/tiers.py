@@ -243,7 +243,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
         "several_starts",
         "its_own_kernels",
         "whatever_the_case",
-        "mirror_images",
+        "mirror_images_are_priced",
     ),
     "session/test_runs_and_files.py": (
         "after_the_iteration[2",
