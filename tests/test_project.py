@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mdstopo
+from tests.sources import tree
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = sorted((ROOT / "mdstopo").rglob("*.py"))
@@ -44,10 +45,10 @@ def test_version_agrees_with_the_changelog():
     assert newest[1] == mdstopo.__version__
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_modules_say_what_they_are(path):
-    text = path.read_text(encoding="utf-8")
-    assert not text or ast.get_docstring(ast.parse(text)), "a module without docstring"
+def test_modules_say_what_they_are():
+    assert len(SOURCES) > 300
+    silent = [path for path in SOURCES if path.stat().st_size and not ast.get_docstring(tree(path))]
+    assert silent == []
 
 
 @pytest.mark.parametrize(

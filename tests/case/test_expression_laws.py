@@ -16,6 +16,7 @@ from mdstopo.finalize.scaled_laws import sized
 from mdstopo.robust.sample import design_sample
 from mdstopo.robust.sampled_case import case_at
 from mdstopo.store.same_case import describe, differences
+from tests.tiers import examples
 
 from .scenes import SMALL, mistakes
 
@@ -139,7 +140,7 @@ def test_formulas_that_are_hostile_are_refused_at_their_column() -> None:
 def test_formulas_that_would_take_all_time_and_memory_are_refused() -> None:
     # each switch is inside of the next, so that every margin and every derivative has all of those before it
     inner = "x"
-    for _ in range(40):
+    for _ in range(examples(14, 40)):
         inner = f"abs(a*{inner}/(b + c*xd) - d*sin(e*t + f*xd)^g)"
     letters = "{a: 1, b: 2, c: 3, d: 4, e: 5, f: 6, g: 7}"
     (found,) = mistakes(with_law(f'{{type: expression, force: "{inner}", parameters: {letters}}}'))

@@ -71,7 +71,8 @@ def test_constraints_and_objectives_of_the_output_are_of_one_design(capsys):
 
 def test_differences_of_fixed_steps_are_of_these_steps(capsys):
     Path("probe.yaml").write_text(single())
-    words = ["gradient", "probe.yaml", "--differences", "--set", "solver.integrator=generalized_alpha", "--json"]
+    words = ["gradient", "probe.yaml", "--differences", "--json"]
+    words += ["--set", "solver.integrator=generalized_alpha", "--set", "solver.step=0.005"]
     assert run_group(words) == 0
     for found in json.loads(capsys.readouterr().out)["methods"].values():
         assert found["differences"]["G1"] < 1e-6

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mdstopo.compiler.jit import inline, member_kernel, vector_entry
-from tests.sources import functions_of
+from tests.sources import functions_of, tree
 
 ROOT = Path(__file__).resolve().parents[2]
 #: what allows LLVM to order sums and products
@@ -28,11 +28,11 @@ def factors(product: ast.expr) -> list[str]:
     return factors(product.operand) if isinstance(product, ast.UnaryOp) else [ast.unparse(product)]
 
 
-def free_powers(source: str) -> list[str]:
+def free_powers(module: ast.Module) -> list[str]:
     """Products of a module with a factor that stands there `OFTEN`, beside another one, where LLVM orders them."""
     return [
         ast.unparse(each)
-        for function in functions_of(source)
+        for function in functions_of(module)
         if any(isinstance(mark, ast.Name) and mark.id in FREE for mark in function.decorator_list)
         for each in ast.walk(function)
         if isinstance(each, ast.BinOp)
@@ -44,7 +44,7 @@ def free_powers(source: str) -> list[str]:
 def test_no_product_of_powers_is_one_that_llvm_may_order() -> None:
     """The aim of an interior point was one: a run took 42 or 83 evaluations by which process had compiled it."""
     places = sorted((ROOT / "mdstopo").rglob("*.py"))
-    found = [(path.name, each) for path in places for each in free_powers(path.read_text(encoding="utf-8"))]
+    found = [(path.name, each) for path in places for each in free_powers(tree(path))]
     assert len(places) > 300
     assert found == []
 
@@ -61,5 +61,5 @@ def test_no_product_of_powers_is_one_that_llvm_may_order() -> None:
 )
 def test_such_a_product_is_found(line: str, found: list[str]) -> None:
     for mark in FREE:
-        assert free_powers(f"@{mark}\ndef f(a, b, c, d):\n    return {line}\n") == found
-    assert free_powers(f"@kernel\ndef f(a, b, c, d):\n    return {line}\n") == []
+        assert free_powers(ast.parse(f"@{mark}\ndef f(a, b, c, d):\n    return {line}\n")) == found
+    assert free_powers(ast.parse(f"@kernel\ndef f(a, b, c, d):\n    return {line}\n")) == []

@@ -14,6 +14,7 @@ import pytest
 
 import mdstopo
 from mdstopo.compiler import tried
+from tests.sources import tree
 
 PACKAGE = Path(mdstopo.__file__).parent
 ROOT = PACKAGE.parent
@@ -178,8 +179,7 @@ NAMED = re.compile("numba|llvmlite")
 def imported(path: Path) -> set[str]:
     """Modules and names that a module imports; of one that does not mention Numba or llvmlite none."""
     found = set()
-    source = path.read_text(encoding="utf-8")
-    for node in ast.walk(ast.parse(source)) if NAMED.search(source) else ():
+    for node in ast.walk(tree(path)) if NAMED.search(path.read_text(encoding="utf-8")) else ():
         if isinstance(node, ast.Import):
             found |= {each.name for each in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:

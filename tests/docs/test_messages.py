@@ -9,6 +9,8 @@ from functools import cache
 
 import pytest
 
+from tests.sources import tree
+
 from .pages import DOCS, ROOT
 
 QUOTED = re.findall(r"^`([^`]+)`$", (DOCS / "troubleshooting.md").read_text(encoding="utf-8"), re.MULTILINE)
@@ -16,10 +18,10 @@ QUOTED = re.findall(r"^`([^`]+)`$", (DOCS / "troubleshooting.md").read_text(enco
 SHORTEST, PART = 9, 8
 
 
-def texts(source: str) -> Iterator[str]:
+def texts(module: ast.Module) -> Iterator[str]:
     """The texts of a module without its docstrings; `...` stands for what varies, backquotes are left out."""
     docstrings: set[ast.AST] = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(module):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node, clean=False):
             docstrings.update(ast.iter_child_nodes(node.body[0]))
         parts: list[object] = []
@@ -35,9 +37,7 @@ def texts(source: str) -> Iterator[str]:
 def sources() -> str:
     """The texts of all modules, one a line."""
     return "\n".join(
-        text.replace("\n", " ")
-        for path in sorted((ROOT / "mdstopo").rglob("*.py"))
-        for text in texts(path.read_text(encoding="utf-8"))
+        text.replace("\n", " ") for path in sorted((ROOT / "mdstopo").rglob("*.py")) for text in texts(tree(path))
     )
 
 

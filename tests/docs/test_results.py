@@ -15,7 +15,6 @@ from mdstopo.session.run_session import run_session
 from tests.fakes import FakeEngineWithEvaluations, hand_made_case, limited
 
 from .pages import DOCS, blocks
-from .test_pages import run
 
 PAGE = (DOCS / "results.md").read_text(encoding="utf-8")
 #: what only the program reads
@@ -148,9 +147,10 @@ def test_every_dataset_on_the_page_is_in_a_result(written: set[str]) -> None:
     assert [path for path, pattern in told.items() if not any(re.fullmatch(pattern, found) for found in written)] == []
 
 
-def test_every_attribute_on_the_page_is_in_a_result(tmp_path: Path) -> None:
+def test_every_attribute_on_the_page_is_in_a_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "case.yaml").write_text(JOINTED.replace("motions", "# motions"), encoding="utf-8")
-    assert run("mdstopo simulate case.yaml", tmp_path).returncode == 0
+    monkeypatch.chdir(tmp_path)
+    assert run_group(["simulate", "case.yaml", "--quiet"]) == 0
     with h5py.File(tmp_path / "results" / "case.simulate.h5") as file:
         there = set(file.attrs)
     section = PAGE.partition("Attributes of the file itself:")[2].partition("| path |")[0]

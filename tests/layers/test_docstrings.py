@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from tests.sources import functions_of
+from tests.sources import functions_of, tree
 
 ROOT = Path(__file__).resolve().parents[2]
 #: a function with more arguments than this names them in its docstring
@@ -35,13 +35,12 @@ def described(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
 def interface(name: str) -> list[ast.FunctionDef]:
     """The functions of an interface's module."""
     (path,) = (ROOT / "mdstopo").rglob(f"{name}.py")
-    body = ast.parse(path.read_text(encoding="utf-8")).body
-    return [each for each in body if isinstance(each, ast.FunctionDef)]
+    return [each for each in tree(path).body if isinstance(each, ast.FunctionDef)]
 
 
-def unnamed(source: str) -> Iterator[tuple[int, str, list[str]]]:
+def unnamed(module: ast.Module) -> Iterator[tuple[int, str, list[str]]]:
     """Line and name of each function with many arguments, and those that its docstring does not name as words."""
-    for function in functions_of(source):
+    for function in functions_of(module):
         names = arguments(function)
         if len(names) > FEW:
             words = set(re.findall(r"\w+", ast.get_docstring(function) or ""))
@@ -54,21 +53,21 @@ def test_a_docstring_names_every_argument_of_many() -> None:
     found = [
         f"{path.relative_to(ROOT).as_posix()}:{line} {name}: {', '.join(missing)}"
         for path in sorted((ROOT / "mdstopo").rglob("*.py"))
-        for line, name, missing in unnamed(path.read_text(encoding="utf-8"))
+        for line, name, missing in unnamed(tree(path))
     ]
     assert found == []
 
 
 def test_an_argument_that_is_not_named_is_found() -> None:
     head = "def f(self, a, b, /, cc, *d, e, **f):\n    "
-    assert list(unnamed(head + "'''a, b: numbers. c, d, e, f: others.'''")) == [(1, "f", ["cc"])]
-    assert list(unnamed(head + "pass")) == [(1, "f", ["a", "b", "cc", "d", "e", "f"])]
-    assert list(unnamed(head + "'''a, b, cc, d, e, f: numbers.'''")) == []
-    assert list(unnamed("def f(a, b, c, d, e): pass")) == []
+    assert list(unnamed(ast.parse(head + "'''a, b: numbers. c, d, e, f: others.'''"))) == [(1, "f", ["cc"])]
+    assert list(unnamed(ast.parse(head + "pass"))) == [(1, "f", ["a", "b", "cc", "d", "e", "f"])]
+    assert list(unnamed(ast.parse(head + "'''a, b, cc, d, e, f: numbers.'''"))) == []
+    assert list(unnamed(ast.parse("def f(a, b, c, d, e): pass"))) == []
 
 
 def test_a_function_of_an_interface_is_described_there_if_it_has_the_same_arguments() -> None:
     head, tail = "def cubic(model, c, h, q0, v0, q1, v1, ", "):\n    '''The cubic; see `kinematics_interface.cubic`.'''"
-    assert list(unnamed(head + "q, v" + tail)) == []
-    assert len(list(unnamed(head + "q, v, a" + tail))) == 1
-    assert len(list(unnamed((head + "q, v" + tail).replace("def cubic", "def quartic")))) == 1
+    assert list(unnamed(ast.parse(head + "q, v" + tail))) == []
+    assert len(list(unnamed(ast.parse(head + "q, v, a" + tail)))) == 1
+    assert len(list(unnamed(ast.parse((head + "q, v" + tail).replace("def cubic", "def quartic"))))) == 1

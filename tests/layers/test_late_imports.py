@@ -6,7 +6,7 @@ from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
 
-from tests.sources import functions_of, statements
+from tests.sources import functions_of, statements, tree
 
 ROOT = Path(__file__).resolve().parents[2]
 Late = tuple[str, str]
@@ -31,10 +31,9 @@ def late() -> tuple[Late, ...]:
     """File and module of each import inside a function of the package."""
     found: list[Late] = []
     for path in sorted((ROOT / "mdstopo").rglob("*.py")):
-        source = path.read_text(encoding="utf-8")
-        if not INDENTED.search(source):
+        if not INDENTED.search(path.read_text(encoding="utf-8")):
             continue
-        for function in functions_of(source):
+        for function in functions_of(tree(path)):
             for node in statements(function):
                 file = path.relative_to(ROOT).as_posix()
                 if isinstance(node, ast.Import):

@@ -4,7 +4,7 @@ import ast
 import re
 from fnmatch import fnmatch
 
-from tests.sources import functions_of
+from tests.sources import functions_of, tree
 
 from .test_imports import ROOT
 
@@ -21,10 +21,10 @@ def listed() -> list[tuple[list[str], list[str]]]:
     return [(re.findall("`([^`]+)`", where), re.findall("`([^`]+)`", names)) for where, names, _ in rows]
 
 
-def long_functions(source: str) -> list[str]:
+def long_functions(module: ast.Module) -> list[str]:
     """The names of functions of a module that are longer than a screen."""
     found = []
-    for node in functions_of(source):
+    for node in functions_of(module):
         docstring = (ast.get_docstring(node, clean=False) or "").count("\n") + 1
         assert node.end_lineno is not None
         if node.end_lineno - node.lineno + 1 - docstring > SCREEN:
@@ -36,7 +36,7 @@ def test_the_page_names_the_functions_that_do_not_fit_a_screen_and_no_others() -
     there = {
         (path.relative_to(ROOT).as_posix(), name)
         for path in sorted((ROOT / "mdstopo").rglob("*.py"))
-        for name in long_functions(path.read_text(encoding="utf-8"))
+        for name in long_functions(tree(path))
     }
     rows = listed()
 
@@ -56,6 +56,6 @@ def test_the_page_names_the_functions_that_do_not_fit_a_screen_and_no_others() -
 
 def test_a_long_function_is_found_whatever_its_docstring() -> None:
     lines = "\n".join(["    x = 1"] * SCREEN)
-    assert long_functions(f"def f():\n    '''Says.\n\n    More.\n    '''\n{lines}\n") == ["f"]
+    assert long_functions(ast.parse(f"def f():\n    '''Says.\n\n    More.\n    '''\n{lines}\n")) == ["f"]
     few = "\n".join(["    x = 1"] * (SCREEN - 1))
-    assert long_functions(f"def f():\n    '''Says.\n\n    More.\n    '''\n{few}\n") == []
+    assert long_functions(ast.parse(f"def f():\n    '''Says.\n\n    More.\n    '''\n{few}\n")) == []

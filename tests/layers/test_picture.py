@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from documentation.layers import IMAGE, ROWS, drawn
-from tests.sources import statements_in
+from tests.sources import statements_in, tree
 
 from .test_imports import ROOT
 
@@ -21,7 +21,7 @@ def rows_of_boxes() -> dict[str, tuple[int, int]]:
 
 def imports(path: Path) -> Iterator[str]:
     """What a module imports of the package while it runs: all but what stands below `if TYPE_CHECKING`."""
-    waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    waiting: list[ast.AST] = [tree(path)]
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":

@@ -194,27 +194,28 @@ def test_rates_of_points_are_derivatives(text):
     assert not point_rates(case, "ground", local, now, v).any()
 
 
-def test_layouts_have_three_views_of_one_scale_and_a_perspective(source, tmp_path):
+@pytest.mark.parametrize("moments", [(None,), (0.0, 0.5)], ids=["of the design", "of two moments"])
+def test_layouts_have_three_views_of_one_scale_and_a_perspective(source, moments, tmp_path):
     pytest.importorskip("matplotlib")
     from mdstopo.plots.space_layout import draw_space
     from mdstopo.plots.style import save, styled
 
     with styled() as module:
         start = start_state(source.case)
-        for panels in ([(None, start)], [(0.0, start), (0.5, states(source.case, np.array([0.5]))[0][0])]):
-            figure = draw_space(module, source, panels, thickness(source))
-            assert len(figure.axes) == 4 * len(panels)
-            scales, labels = [], []
-            for axis in figure.axes:
-                if axis.get_xlabel():
-                    labels.append((axis.get_title("left")[:5].strip(" ,"), axis.get_xlabel(), axis.get_ylabel()))
-                    box = axis.get_position().size * figure.get_size_inches()
-                    scales += [box[0] / np.ptp(axis.get_xlim()), box[1] / np.ptp(axis.get_ylim())]
-            assert scales == pytest.approx([scales[0]] * 6 * len(panels))
-            assert set(labels) == {("front", "x, m", "z, m"), ("top", "x, m", "y, m"), ("side", "y, m", "z, m")}
-            for ending in ("svg", "png"):
-                save(figure, tmp_path / f"layout.{ending}")
-                assert (tmp_path / f"layout.{ending}").stat().st_size > 5000
+        panels = [(t, states(source.case, np.array([t]))[0][0] if t else start) for t in moments]
+        figure = draw_space(module, source, panels, thickness(source))
+        assert len(figure.axes) == 4 * len(panels)
+        scales, labels = [], []
+        for axis in figure.axes:
+            if axis.get_xlabel():
+                labels.append((axis.get_title("left")[:5].strip(" ,"), axis.get_xlabel(), axis.get_ylabel()))
+                box = axis.get_position().size * figure.get_size_inches()
+                scales += [box[0] / np.ptp(axis.get_xlim()), box[1] / np.ptp(axis.get_ylim())]
+        assert scales == pytest.approx([scales[0]] * 6 * len(panels))
+        assert set(labels) == {("front", "x, m", "z, m"), ("top", "x, m", "y, m"), ("side", "y, m", "z, m")}
+        for ending in ("svg", "png"):
+            save(figure, tmp_path / f"layout.{ending}")
+            assert (tmp_path / f"layout.{ending}").stat().st_size > 5000
 
 
 @pytest.fixture(scope="module")
