@@ -1,5 +1,7 @@
 """Points in drawings: tables of numbers (CSV), DXF and SVG. What comes out is points by the name of their layer."""
 
+import csv
+import io
 import math
 import re
 import xml.etree.ElementTree as Xml
@@ -8,7 +10,6 @@ from contextlib import contextmanager
 from itertools import chain, pairwise
 from pathlib import Path
 
-from mdstopo.case.keys.text_tables import cells_of, separator_of, written_lines
 from mdstopo.case.text.words import DECIMAL_SIGN
 from mdstopo.shown import counted
 
@@ -78,24 +79,27 @@ def _csv(data: str, path: Path) -> tuple[Layers, None]:
     """
     layers: Layers = {}
     names: list[str] = []
-    lines = written_lines(data)
-    separator = separator_of(lines[1:] or lines)
-    for number, line in lines:
-        try:
-            cells = cells_of(number, line, separator)
-        except ValueError as error:
-            raise ImportedError(f"{path}, {error}") from None
-        there = [cell for cell in cells if cell]
-        if not layers and not any(map(_is_number, there)):
-            if not _coordinates(names):  # a second line, as one of units, leaves the first
-                names = [cell for cell in there if not _UNIT_ALONE.fullmatch(cell)] if separator == " " else cells
-            continue
-        with mistakes_in(f"{path}, line {number}"):
-            if separator in " \t" and len(there) == len([name for name in names if name]) != len(cells):
-                cells = there  # tabs that only align
-            named = bool(_coordinates(names))
-            layer, point = _named_point(names, cells, separator) if named else _point(names, there)
-        layers.setdefault(layer or path.stem, []).append(point)
+    sample = data[:4096]
+    delimiter = next((each for each in (";", "\t", ",") if each in sample), " ")
+    rows = csv.reader(io.StringIO(data), delimiter=delimiter, skipinitialspace=True)
+    try:
+        for number, row in enumerate(rows, start=1):
+            cells = [cell.strip() for cell in row]
+            there = [cell for cell in cells if cell]
+            if not there or there[0].startswith("#"):
+                continue
+            if not layers and not any(map(_is_number, there)):
+                if not _coordinates(names):  # a second line, as one of units, leaves the first
+                    names = [cell for cell in there if not _UNIT_ALONE.fullmatch(cell)] if delimiter == " " else cells
+                continue
+            with mistakes_in(f"{path}, line {number}"):
+                if delimiter in " \t" and len(there) == len([name for name in names if name]) != len(cells):
+                    cells = there  # blanks and tabs that only align
+                named = bool(_coordinates(names))
+                layer, point = _named_point(names, cells, delimiter) if named else _point(names, there)
+            layers.setdefault(layer or path.stem, []).append(point)
+    except csv.Error as error:
+        raise ImportedError(f"{path}, line {rows.line_num}: a cell cannot be read: {error}") from None
     return layers, None
 
 

@@ -73,6 +73,7 @@ class Sizes:
         if f"{SEARCH}/numbers" not in view.arrays:
             return
         self._before = view
+        self._spent = int(view.under(SEARCH).get("spent", 0))
         if state is None or not self.is_chosen(state):
             return
         with _whole(view):
@@ -105,10 +106,12 @@ class Sizes:
         self._continuous = float(state.best_objective)
         everyone = self._was_everyone()
         progress = self._searched(problem, state, everyone, stop, keep, notify)
-        some = 0 < self._kept < len(self._groups_at())
-        if progress.finished and progress.x is None and some and not everyone:
-            notify(f"no choice of sizes of these {self._kept} keeps the constraints; the others may have sizes, too")
-            self._before, self._spent = None, progress.evaluations
+        everybody = len(self._groups_at())
+        # where none is kept, what is optimal is next to nothing everywhere, and no size is near it
+        if progress.finished and progress.x is None and 0 < self._kept < everybody and not everyone:
+            before = f"no sizes of the {self._kept} kept keep the constraints"
+            notify(f"{before}: now sizes of all {count_text(everybody)} are chosen")
+            self._before, self._spent = None, progress.evaluations  # the next search is another one
             progress = self._searched(problem, state, True, stop, keep, notify)
         if (not progress.finished and stop()) or progress.x is None:
             return state
@@ -189,7 +192,7 @@ class Sizes:
         """How the run ends where no sizes have been chosen; None where they have, or were not asked for."""
         if not self.asked or self.is_chosen(state) or self.outcome is None:
             return None
-        ended = self.outcome.finished or self.outcome.evaluations >= MOST_EVALUATIONS
+        ended = self.outcome.finished or self.outcome.evaluations - self._spent >= MOST_EVALUATIONS
         if ended and not self.outcome.sizes:
             what = "keeps the constraints" if self.outcome.finished else f"was found in {self.outcome.nodes} nodes"
             if not self.outcome.members:
@@ -198,7 +201,10 @@ class Sizes:
                     "and all members at their least sizes do not keep the constraints"
                 )
             return RunStatus.FAILED, f"no choice of sizes {what}; the design is the continuous optimum"
-        return RunStatus.INTERRUPTED, "stopped on request while sizes were chosen; the best choice so far is saved"
+        saved = (
+            "the best choice so far is saved" if self.outcome.sizes else "none that keeps the constraints is known yet"
+        )
+        return RunStatus.INTERRUPTED, f"stopped on request while sizes were chosen; {saved}"
 
     def part(self) -> Datasets:
         """The datasets that a file keeps of the search, and before its end the best choice as the design."""
@@ -206,6 +212,7 @@ class Sizes:
             return {} if self._before is None else _kept(self._before)
         progress = self._search.progress
         part: Datasets = {f"{SEARCH}/{name}": array for name, array in self._search.to_arrays().items()}
+        part[f"{SEARCH}/spent"] = np.array(self._spent)
         part[f"{CATALOGUE}/continuous"] = np.array(self._sign * self._continuous)
         part[f"{CATALOGUE}/bound"] = np.array(self._sign * progress.bound)
         if progress.x is not None:
@@ -280,8 +287,8 @@ class Sizes:
         return ChosenSizes(
             members=self._kept, choices=catalogued.choices, objective=sign * progress.objective,
             continuous=sign * self._continuous, bound=sign * progress.bound, nodes=progress.nodes,
-            evaluations=progress.evaluations, exhaustive=progress.exhaustive, exchanged=progress.exchanged,
-            finished=progress.finished, sizes=chosen,
+            evaluations=self._spent + progress.evaluations, exhaustive=progress.exhaustive,
+            exchanged=progress.exchanged, finished=progress.finished, sizes=chosen,
         )  # fmt: skip
 
     def _reason(self, progress: SearchProgress) -> str:
@@ -294,7 +301,7 @@ class Sizes:
         size = abs(self._continuous) or 1.0
         worse = (progress.objective - self._continuous) / size
         return (
-            f"sizes of {self._kept} members chosen: {how}, {progress.evaluations} evaluations; "
+            f"sizes of {self._kept} members chosen: {how}, {self._spent + progress.evaluations} evaluations; "
             f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
         )
 

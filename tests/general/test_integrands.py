@@ -438,6 +438,25 @@ def test_integrals_hold_the_tolerance_where_the_motion_does_not_feel_what_is_int
     assert found.gradients["E"] == pytest.approx([value], rel=5e-8)
 
 
+def test_what_oscillates_within_a_step_is_integrated_beside_many_short_steps():
+    """A slider does not feel the load across it, and a table gives another body 100 short steps in the first second."""
+    table = [[k / 100, float(k * k % 7)] for k in range(101)] + [[301.0, 0.0]]
+    case = f"""
+format: 1
+time: {{end: 300}}
+bodies:
+  a: {{mass: 1, inertia: 1, position: [0, 0], velocity: [0.3, 0]}}
+  b: {{mass: 1, inertia: 1, position: [0, 5]}}
+joints: [{{name: p, type: prismatic, bodies: [ground, a], at: [0, 0], axis: [1, 0]}}]
+loads: [{{body: a, force: [0, "sin(7*t)"]}}, {{body: b, force: [{{table: {table}}}, 0]}}]
+objectives: {{F: {{response: {{joint_force: {{joint: p}}}}, over_time: mean}}}}
+solver: {{tolerance: 1e-6, integrator: runge_kutta}}
+"""
+    halves, rest = divmod(7.0 * 300.0, np.pi)
+    mean = (2.0 * halves + 1.0 - np.cos(rest)) / 7.0 / 300.0
+    assert evaluate(read_case(case)).objectives["F"] == pytest.approx(mean, rel=1e-6)
+
+
 def test_the_energy_of_a_driven_body_is_integrated_to_the_tolerance():
     text = PASSING.replace("OVER", "mean").replace("LAW", "{type: spring, stiffness: 1, damping: 0.1}")
     text += "motions: [{body: a, x: {velocity: 5}, y: {velocity: 0}, angle: {velocity: 0}}]\n"

@@ -325,4 +325,30 @@ def test_members_that_are_next_to_nothing_get_a_size_where_without_them_a_limit_
             best[found.objectives["X"]] = list(choice)
     assert outcome.alpha.tolist() == best[min(best)] == [0.7, 0.4]
     assert outcome.sizes.members == 2
-    assert any("no choice of sizes of these 1 keeps the constraints" in each for each in said)
+    assert any("no sizes of the 1 kept keep the constraints: now sizes of all 2 are chosen" in each for each in said)
+
+
+@pytest.mark.parametrize("stopped", [6, 9, 11, 14])
+def test_a_choice_that_went_on_with_all_members_goes_on_where_it_was_stopped(tmp_path, stopped):
+    case = read_case(CROSSED)
+    whole = run_session(case, path=tmp_path / "whole.h5")
+    asked = 0
+
+    def stop():
+        nonlocal asked
+        asked += searching
+        return asked > stopped
+
+    searching = False
+
+    def notify(said):
+        nonlocal searching
+        searching |= said.startswith("choosing sizes of")
+
+    part = run_session(case, path=tmp_path / "part.h5", stop_requested=stop, notify=notify)
+    assert part.status is RunStatus.INTERRUPTED
+    resumed = run_session(case, path=tmp_path / "part.h5", resume=True)
+    assert np.array_equal(resumed.alpha, whole.alpha)
+    assert resumed.sizes == whole.sizes
+    assert resumed.reason == whole.reason
+    assert resumed.evaluations == whole.evaluations

@@ -138,10 +138,10 @@ class Reading:
         for path, kind, name, also in self.references:
             if not self.knows(kind, name) and len(self.mistakes) < MOST_MISTAKES:
                 names = self.names(kind)
-                if names and kind != "load case":  # `default` is for cases that name no load case
-                    names = [*names, *also]
+                words = also if names and kind != "load case" else ()  # `default` is of cases that name no load case
                 there = f"there are {listed(names)}" if names else f"the case has no {kind}"
-                hint = did_you_mean(name, names) or ";"
+                there += f"; or {listed(words)}" if words else ""
+                hint = did_you_mean(name, [*names, *words]) or ";"
                 self.mistake(path, f"no {kind} is called {shown(name)}{hint} {there}")
 
     def names(self, kind: str) -> list[str]:

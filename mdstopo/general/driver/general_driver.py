@@ -36,6 +36,7 @@ from mdstopo.general.responses.extremes import (
     COLUMNS,
     FRACTION,
     LAST,
+    SEEN,
     SIGN,
     STEP,
     TIME,
@@ -139,7 +140,8 @@ class GeneralDriver:
         #: arrays for the results of `evaluate_one`, and of `_integral_with_gradient`
         self._one = (
             np.zeros(1, dtype=np.int64), np.zeros((1, 1), dtype=np.int64), np.zeros((1, 2)),
-            np.zeros((1, len(model.q0))), np.zeros((2, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 1, 3)),
+            np.zeros((1, len(model.q0))), np.zeros((2, 1, n)), np.zeros((1, self._multipliers)),
+            np.zeros((1, 1, SEEN)),
         )  # fmt: skip
         #: for states that nobody asks for
         self._no_states = np.zeros((0, len(model.q0))), np.zeros((2, 0, n)), np.zeros((0, self._multipliers))
@@ -535,7 +537,7 @@ class GeneralDriver:
         whose = np.full((len(places), int(j >= 0)), who, dtype=np.int64)
         js = np.array([j] if j >= 0 else [], dtype=np.int64)
         states, lam, seen = self.sample_responses(js, places, whose, exact, count, steps, rates)
-        return states, lam, seen[:, 0] if j >= 0 else np.full((len(places), 3), np.nan)
+        return states, lam, seen[:, 0] if j >= 0 else np.full((len(places), SEEN), np.nan)
 
     def sample_responses(
         self,
@@ -547,8 +549,16 @@ class GeneralDriver:
         steps: GeneralSteps | None = None,
         rates: bool = True,
     ) -> tuple[tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
-        """As `sample_response`, of responses js (R,), with members who (K, R); values and rates are (K, R, 3). Without
-        rates one balance at each place serves all."""
+        """States and responses anywhere on the motion; without rates one balance at each place serves all.
+
+        js (R,): the responses; none: states alone.
+        places (K, 2): steps and fractions of them.
+        who (K, R): the members whose forces are meant; -1: the one with the largest there.
+        exact, count, steps, rates: as of `sample_response`.
+
+        Returns q (K, n_q) with v, a (2, K, n), multipliers (K, n_row + n_driven), and (K, R, 3) values in the units of
+        the responses, rates (per s) and members.
+        """
         model = self.scene.model
         packed, limits, room, room_ints, member_state = (
             ((self.ints, self.floats), self.limits, self.room, self.room_ints, self.member_state)
@@ -557,7 +567,7 @@ class GeneralDriver:
         )
         q, out = np.zeros((len(places), len(model.q0))), np.zeros((2, len(places), len(model.mass)))
         lam = np.zeros((len(places), self._multipliers))
-        seen = np.zeros((*who.shape, 3))
+        seen = np.zeros((*who.shape, SEEN))
         self.entry.sample_responses(
             self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, member_state, exact, rates, js,
             who, places, q, out, lam, seen, self.work,
@@ -567,9 +577,13 @@ class GeneralDriver:
     def values_at(
         self, js: IndexArray, places: FloatArray, count: int, exact: bool = False, who: IndexArray | None = None
     ) -> FloatArray:
-        """(K, R): values alone of responses js (R,) at places (K, 2), as `sample_responses` has them."""
+        """(K, R): values of responses js (R,), each in its unit, at places (K, 2), steps and fractions of them.
+
+        count, exact: as of `sample_response`. who (K, R): the members whose forces are meant; None: at each place the
+        one with the largest.
+        """
         whose = np.full((len(places), len(js)), -1) if who is None else who
-        seen = np.zeros((*whose.shape, 3))
+        seen = np.zeros((*whose.shape, SEEN))
         self.entry.sample_responses(
             *self._history_arguments(count), exact, False, js, whose, places, *self._no_states, seen, self.work
         )

@@ -18,8 +18,11 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 CLOSE = 1e-3
 #: how far a cubic between two samples may be off beside, relative to the largest rate there, per interval
 OFF = 1e-4
-#: members that are compared between two samples at most, those with the largest forces
+#: members that are compared between two samples at most, those with the largest forces; of more that come near the
+#: largest force there at once, changes between the others are not looked for
 MOST = 24
+#: pairs that are looked at in one go, each at all samples of a step
+AT_ONCE = 100_000
 #: places between two samples at which cubics are compared, and how far any other place is from the nearest at most
 PLACES = np.linspace(0.0, 1.0, 33)
 APART = 0.5 * float(PLACES[1])
@@ -30,7 +33,7 @@ NEWTON, ENOUGH = 80, 1e-12
 #: bisections of a cubic: it only says where Newton's method begins
 BISECTIONS = 20
 
-#: step (K,), fraction of it (K,), members (2, K) as rows of the samples -> forces (2, K) (N) and rates (2, K) per step
+#: step (P,), fraction of it (P,), members (2, P) as rows of the samples -> forces (2, P) (N) and rates (2, P) per step
 Exact = Callable[[IndexArray, FloatArray, IndexArray], tuple[FloatArray, FloatArray]]
 
 
@@ -96,6 +99,11 @@ class Contest(NamedTuple):
     curves: Cubics
     steepest: FloatArray
 
+    def some(self, cells: IndexArray) -> "Contest":
+        """Some of the intervals."""
+        curves = self.curves.some(slice(None), cells)
+        return Contest(self.step[cells], self.interval[cells], self.members[:, cells], curves, self.steepest[cells])
+
 
 def lead_changes(
     force: FloatArray, rate: FloatArray, may: NDArray[np.bool_], fine: FloatArray, exact: Exact
@@ -108,6 +116,17 @@ def lead_changes(
     exact: forces and rates on the motion itself.
     """
     contest = _contest(force, rate, may)
+    most, cells = len(contest.members), np.arange(len(contest.step))
+    portions = np.array_split(cells, max(1, -(-most * most * len(cells) // AT_ONCE)))
+    found = [_changes_in(contest.some(cells), force, fine, exact) for cells in portions]
+    step, fraction = (np.concatenate(each) for each in zip(*found, strict=True))
+    order = np.lexsort([fraction, step])
+    return step[order], fraction[order]
+
+
+def _changes_in(contest: Contest, force: FloatArray, fine: FloatArray, exact: Exact) -> tuple[IndexArray, FloatArray]:
+    """Where members of a contest change hands: number of the step (R,), fraction of it (R,); arguments as of
+    `lead_changes`."""
     pairs = _pairs(contest, force)
     a, b = (contest.curves.some(rows, pairs.cell) for rows in pairs.rows)
     difference = Cubics(*(x - pairs.sign * y for x, y in zip(a, b, strict=True)))
@@ -116,7 +135,9 @@ def lead_changes(
     dips = ~turns & (values[0] * rates[0] < 0.0) & (values[1] * rates[1] > 0.0)
     guess = np.zeros(len(turns))
     guess[turns] = _zeros(difference.some(turns))
-    guess[dips], dips[dips] = _turning(difference.some(dips))
+    lowest, passes = _turning(difference.some(dips))
+    guess[dips] = lowest
+    dips[dips] = passes
     kept = np.flatnonzero(turns | dips)
     kept = kept[_leads(contest, pairs.some(kept), guess[kept])]
     pairs, guess, turns, start = pairs.some(kept), guess[kept], turns[kept], values[0][kept]
@@ -125,10 +146,13 @@ def lead_changes(
     search = _Search(pairs, step, exact)
     crossed, dipped = np.flatnonzero(turns), np.flatnonzero(~turns)
     found = [search.zeros(crossed, low[crossed], (low + width)[crossed], (low + guess * width)[crossed])]
+    # samples are of quintics: a zero beside one of them may lie on its other side on the motion itself
+    missed = np.setdiff1d(crossed, found[0][0])
+    left, right = (np.clip(each[missed], 0.0, 1.0) for each in (low - width, low + 2.0 * width))
+    found.append(search.zeros(missed, left, right, (low + guess * width)[missed]))
     found += search.zeros_of_dips(dipped, low[dipped], width[dipped], guess[dipped], start[dipped])
     which, fraction = (np.concatenate(each) for each in zip(*found, strict=True))
-    order = np.lexsort([fraction, step[which]])
-    return step[which][order], fraction[order]
+    return step[which], fraction
 
 
 def _contest(force: FloatArray, rate: FloatArray, may: NDArray[np.bool_]) -> Contest:
@@ -220,6 +244,7 @@ def _leads(contest: Contest, pairs: Pairs, guess: FloatArray) -> NDArray[np.bool
     a, b = (contest.curves.some(rows, pairs.cell) for rows in pairs.rows)
     near = np.zeros(len(guess), dtype=bool)
     steepest = contest.steepest[pairs.cell]
+    # cubics of forces that are nearly the same meet anywhere: not only where the guess is
     for x in PLACES.tolist():
         largest = np.abs(contest.curves.at(x)).max(axis=0, initial=0.0)[pairs.cell]
         slack = 2.0 * (CLOSE * largest + OFF * steepest)

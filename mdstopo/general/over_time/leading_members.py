@@ -146,9 +146,14 @@ def _changes(group: _Group, steps: IndexArray, who: IndexArray, may: NDArray[np.
     force, rate = group.sampled(steps, FINE, who)
 
     def exact(step: IndexArray, fraction: FloatArray, members: IndexArray) -> tuple[FloatArray, FloatArray]:
-        some, own = np.unique(members, return_inverse=True)
-        seen = group.exact(steps[step], fraction, who[some])
-        force, rate = (each[own.reshape(members.shape), np.arange(len(step))] for each in seen)
+        force, rate = np.empty(members.shape), np.empty(members.shape)
+        at_once = max(1, BATCH // len(who))
+        for first in range(0, len(step), at_once):
+            part = slice(first, first + at_once)
+            some, own = np.unique(members[:, part], return_inverse=True)
+            seen = group.exact(steps[step[part]], fraction[part], who[some])
+            own, at = own.reshape(members[:, part].shape), np.arange(members[:, part].shape[1])
+            force[:, part], rate[:, part] = seen[0][own, at], seen[1][own, at]
         return force, rate
 
     step, fraction = lead_changes(force, rate, _may_lead(force, rate) & may[:, :, None], FINE, exact)

@@ -38,12 +38,13 @@ class NestedRules(NamedTuple):
 
 @cache
 def nested_rules(nodes: tuple[float, ...], weights: tuple[float, ...]) -> NestedRules:
-    """A rule on [0, 1], and one with its nodes and as few more as make it better by five degrees and of `DEGREE`."""
+    """A rule on [0, 1], and one with its nodes and as few more as make it exact to `DEGREE` and by five degrees more
+    than the given one; where no such nodes lie within, Gauss's rule beside it."""
     given, at = np.unique(nodes, return_inverse=True)
     own = np.bincount(at, np.asarray(weights)).astype(np.float64)
     for count in range(1, (MORE if _error(given, own, DEGREE) < EXACT else GAUSS) + 1):
         degree = len(given) + 2 * count - 1
-        if degree < DEGREE or _error(given, own, degree - 5) < EXACT:
+        if degree < DEGREE or _error(given, own, degree - 4) < EXACT:
             continue
         places = np.concatenate([given, _added(given, count)])
         if not (np.all((places >= 0.0) & (places <= 1.0)) and np.diff(np.sort(places)).min() > APART):

@@ -9,7 +9,6 @@ agree. The motion is computed once more with steps that end at these middles; si
 all is checked again. Steps of fixed length promise no accuracy, and stay as they are.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -33,9 +32,9 @@ ROUNDS = 3
 #: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
 #: tolerances). It costs little, because one halving more lowers the difference by hundreds
 SHARE = 1e-3
-#: halvings of one step at most; after PATIENCE of them, and once a run has at least RESOLVED parts, a step is given up
-#: where one more leaves a larger share of the difference than VAIN: what is left is rounding. In fewer parts it may be
-#: an integrand that oscillates within them, as one of a load that the motion does not feel
+#: halvings of one step at most; after PATIENCE of them a part that is shorter than the motion by RESOLVED is given up
+#: where one more leaves a larger share of the difference than VAIN: what is left is rounding. In a longer one it may be
+#: an integrand that oscillates within it, as one of a load that the motion does not feel
 HALVINGS, PATIENCE, VAIN, RESOLVED = 24, 3, 0.7, 256
 #: how much of an earlier difference counts after one more halving: beside a kink one may be small by chance, and
 #: differences fall to a quarter
@@ -98,7 +97,7 @@ def _held_at_zero(driver: DriverWithRun, count: int, nothing: Mapping[int, float
     asked = [j for j, size in nothing.items() if size > 0.0 or has_kinks(model, j)]
     steps = np.arange(count)
     if count > FEW:  # what is not often zero in some steps is not mostly zero in all
-        asked = _seem_held(driver, count, {j: nothing[j] for j in asked}, steps[:: count // FEW], OFTEN)
+        asked = _seem_held(driver, count, {j: nothing[j] for j in asked}, steps[:: -(-count // FEW)], OFTEN)
     return set(_seem_held(driver, count, {j: nothing[j] for j in asked}, steps, MOSTLY))
 
 
@@ -201,8 +200,8 @@ def halves(
     span = float(t[-1] - t[0])
     step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
     found: list[float] = []
+    allowed = tolerance * min(1.0, RESOLVED / len(low))  # what steps are off by may add up
     whole, before, asked = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0), dtype=np.bool_)
-    patience = max(PATIENCE, math.ceil(math.log2(RESOLVED / len(low))))
     for depth in range(HALVINGS):
         times = low[:, None] + width[:, None] * rules.places
         fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
@@ -215,10 +214,10 @@ def halves(
             either = np.maximum(whole, np.abs(sums).sum(axis=0))  # either may miss a pulse
             asked = np.tile(either > nothing * span, (len(low), 1))
         off = np.abs(sums - better)
-        bad = asked & (off > tolerance * whole) & (width > 2.0 * APART * span)[:, None]
-        if depth >= patience:  # what does not fall with its halves is rounding
+        bad = asked & (off > allowed * whole) & (width > 2.0 * APART * span)[:, None]
+        if depth >= PATIENCE:  # what does not fall with its halves is rounding
             pair = off.reshape(2, -1, len(whole)).sum(axis=0)
-            bad &= np.tile(pair <= VAIN * before, (2, 1))
+            bad &= np.tile(pair <= VAIN * before, (2, 1)) | (width * RESOLVED > span)[:, None]
         some = bad.any(axis=1)
         if not some.any():
             break

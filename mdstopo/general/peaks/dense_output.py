@@ -6,8 +6,9 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.dynamics.accelerations import make_workspace, solve_accelerations
+from mdstopo.general.dynamics.forces import members_alone
 from mdstopo.general.model.bundles import bundle
-from mdstopo.general.model.general_model import ORDER, SUBJECT, unpack_general
+from mdstopo.general.model.general_model import ENERGY, KIND, ORDER, SUBJECT, unpack_general
 from mdstopo.general.model.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.responses.general_responses import (
     APART,
@@ -185,7 +186,8 @@ def sample_responses(
       room, room_ints: flat arrays of the history of steps (`carve_history`).
       exact: whether states inside steps are those of the method's own motion; else of the quintic through the
         coordinates, velocities and accelerations at both ends.
-      rates: whether rates are wanted; else, where no response needs a balance, there may be no a and lam_out either.
+      rates: whether rates are wanted; else a and lam_out are only what the responses need of them, and those of
+        driven coordinates mean nothing.
       js (R,): the responses; none: states alone.
       who (K, R): numbers of the members whose forces are meant; -1: of the one with the largest force there.
       places (K, 2): steps, and fractions of them; 0 and 1 are the states at the ends as they are in that step.
@@ -204,7 +206,7 @@ def sample_responses(
     n_row = model.size[0]
     last = -1
     driven = model.driven.shape[0] > 0
-    needed = balance_of(model, js)
+    needed = balance_of(tag, model, js)
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
@@ -233,20 +235,29 @@ def sample_responses(
             lam_out[i, n_row + m] = force - held_back(model, motion.workspace, d, motion.a, motion.lam)
 
 
-#: what values of responses take beyond the state: nothing, accelerations, all that a balance leaves
-NOTHING, ACCELERATIONS, BALANCE = range(3)
+#: what values of responses take beyond the state: nothing, sums over the members, accelerations, all that a balance
+#: leaves
+NOTHING, SUMS, ACCELERATIONS, BALANCE = range(4)
 
 
 @kernel
-def balance_of(model, js):
-    """What the values of responses js (R,) take, beyond the state, of all that any of them takes."""
-    needed = NOTHING
+def balance_of(tag, model, js):
+    """What the values of responses js (R,) take beyond the state, the most that any of them takes.
+
+    tag: the method of integration; energies take sums alone where it has states inside steps (`rated`).
+    """
+    sums = False
+    accelerations = False
     for j in js:
-        if needs_balance(model, j):
+        if is_continuous(tag) and model.response[j, KIND] == ENERGY:
+            sums = True
+        elif needs_balance(model, j):
             return BALANCE
-        if model.response[j, ORDER] > 1:
-            needed = ACCELERATIONS
-    return needed
+        elif model.response[j, ORDER] > 1:
+            accelerations = True
+    if sums:
+        return BALANCE if accelerations else SUMS
+    return ACCELERATIONS if accelerations else NOTHING
 
 
 @kernel
@@ -278,6 +289,10 @@ def _values(tag, motion, js, k, c, who, needed, seen):
     segment, t = motion.history.index[k, SEGMENT], time_at(motion.history, k, c)
     if needed == ACCELERATIONS and (c <= 0.0 or c >= 1.0):
         balance_at_end(tag, motion, k, 1 if c >= 1.0 else 0, q, v, a)
+    elif needed == SUMS:
+        members_alone(model, member_state, segment, t, q, v, workspace)
+        motion.work[FORCES] += 1
+        motion.work[OF_SAMPLES] += 1
     elif needed != NOTHING:
         solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
         motion.work[FORCES] += 1

@@ -21,6 +21,8 @@ COLUMNS = 9
 #: in column OTHER in place of a member: there is none; the value is a zero, and stays one for designs nearby. One from
 #: MARGINS on (`expressions`) is the margin of a switch that changes there, whose derivative is added
 NOBODY, ZERO = -1.0, -2.0
+#: how many numbers are seen of a response at a place: value, rate, member
+SEEN = 3
 #: samples of every step
 FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SAMPLES = len(FRACTIONS)
@@ -34,7 +36,7 @@ def sample(count: int, evaluate_at: EvaluateAt) -> FloatArray:
     places = np.empty((count, SAMPLES, 2))
     places[:, :, 0] = np.arange(count)[:, None]
     places[:, :, 1] = FRACTIONS
-    return evaluate_at(places.reshape(-1, 2), False).reshape(count, SAMPLES, 3)
+    return evaluate_at(places.reshape(-1, 2), False).reshape(count, SAMPLES, SEEN)
 
 
 def row_of(time: float, value: float, step: float, fraction: float, rate: float, sign: float, who: float) -> FloatArray:
