@@ -28,6 +28,8 @@ _LENGTH = r"(?:-|[nuµμmcdk]?m|in|inch|inches|ft|feet|yd|mi|px|pt|pixels?|met(?
 #: a letter with its unit in the name of a column, and a unit that blanks have made a cell of its own
 _WITH_UNIT = re.compile(rf"([xyz])(?:\s*\[{_LENGTH}\]|\s*\({_LENGTH}\)|\s*/\s*{_LENGTH}|[_ ]{_LENGTH})")
 _UNIT_ALONE = re.compile(rf"\[{_LENGTH}\]|\({_LENGTH}\)", re.IGNORECASE)
+#: a number with a decimal comma, and what is left between two commas of two such numbers behind a blank
+_DECIMAL = re.compile(r"[-+]?\d+,\d+|\d+\s+[-+]?\d+")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 #: an arc of a path: its two flags are one digit each, which the next number may follow at once
 _ARC = r"[\s,]*".join(f"({each})" for each in (*[_NUMBER] * 3, "[01]", "[01]", *[_NUMBER] * 2))
@@ -89,6 +91,9 @@ def _csv(data: str, path: Path) -> tuple[Layers, None]:
             if not there or there[0].startswith("#"):
                 continue
             if not layers and not any(map(_is_number, there)):
+                if _decimal(there):
+                    told = f"found {delimiter.join(there)}{_decimal(there)}, allowed are numbers"
+                    raise ImportedError(f"{path}, line {number}: {told}")
                 if not _coordinates(names):  # a second line, as one of units, leaves the first
                     names = [cell for cell in there if not _UNIT_ALONE.fullmatch(cell)] if delimiter == " " else cells
                 continue
@@ -104,12 +109,12 @@ def _csv(data: str, path: Path) -> tuple[Layers, None]:
 
 
 def _is_number(cell: str) -> bool:
-    return re.fullmatch(_NUMBER, cell) is not None
+    return re.fullmatch(_NUMBER, cell) is not None and math.isfinite(float(cell))
 
 
 def _decimal(cells: list[str]) -> str:
     """What is said of numbers with a decimal comma, empty where there is none."""
-    return f" ({DECIMAL_SIGN})" if any(re.fullmatch(r"[-+]?\d+,\d+", cell) for cell in cells) else ""
+    return f" ({DECIMAL_SIGN})" if any(_DECIMAL.fullmatch(cell) for cell in cells) else ""
 
 
 def _named_point(names: list[str], cells: list[str], delimiter: str) -> tuple[str, Point]:
@@ -137,7 +142,7 @@ def _point(names: list[str], cells: list[str]) -> tuple[str, Point]:
     """The layer (empty: none) and all numbers of a row, in order: columns have no names, or others than x and y."""
     words = [cell for cell in cells if not _is_number(cell)]
     numbers = tuple(float(cell) for cell in cells if _is_number(cell))
-    if len(numbers) not in (2, 3) or len(words) > 1:
+    if len(numbers) not in (2, 3) or len(words) > 1 or _decimal(words):
         raise ValueError(f"found {', '.join(cells)}{_decimal(cells)}, allowed are x, y or x, y, z and a name")
     if len(numbers) == 3 and len(names) == len(cells):
         told = (
