@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.arrays import FloatArray
 from mdstopo.case.design.stages import stage_count
 from mdstopo.case.model import Case
 from mdstopo.limiting.bounds import Bound, bounds
@@ -88,14 +89,26 @@ def _best(case: Case, view: ResultView) -> dict[str, float | None]:
     return result
 
 
-def kept_iterates(case: Case, view: ResultView) -> NDArray[np.bool_]:
-    """(K + 1,) which iterates keep all limits, with the powers of the last stage, or with the sizes chosen."""
+def violations(case: Case, view: ResultView) -> FloatArray:
+    """(K + 1,) by how much each iterate exceeds the limit that it breaks most, relative to the bound; at most 0 where
+    it keeps all."""
     excess = np.asarray(view.array("iterations/constraints"), dtype=np.float64)
-    good = np.ones(len(excess), dtype=np.bool_)
+    most = np.full(len(excess), -np.inf)
     for i, row in enumerate(case.constraints):
         over = {"limit": excess[:, i], "at_least": -excess[:, i], "equals": np.abs(excess[:, i])}[row.sense]
-        good &= over <= TOLERATED * (abs(row.bound) or 1.0)
-    if "iterations/stage" in view.arrays:
-        stage = np.asarray(view.array("iterations/stage"))
-        good &= stage == max(stage_count(case) - 1, stage.max(initial=0))
-    return good
+        most = np.maximum(most, over / (abs(row.bound) or 1.0))
+    return most
+
+
+def of_last_stage(case: Case, view: ResultView) -> NDArray[np.bool_]:
+    """(K + 1,) which iterates have the powers of the last stage, or the sizes chosen."""
+    if "iterations/stage" not in view.arrays:
+        return np.ones(len(view.array("iterations/constraints")), dtype=np.bool_)
+    stage = np.asarray(view.array("iterations/stage"))
+    found: NDArray[np.bool_] = stage == max(stage_count(case) - 1, stage.max(initial=0))
+    return found
+
+
+def kept_iterates(case: Case, view: ResultView) -> NDArray[np.bool_]:
+    """(K + 1,) which iterates keep all limits, with the powers of the last stage, or with the sizes chosen."""
+    return of_last_stage(case, view) & (violations(case, view) <= TOLERATED)

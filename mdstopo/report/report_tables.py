@@ -9,7 +9,7 @@ from mdstopo.case.design.stages import stage_count
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case
 from mdstopo.case.responses.response_units import constrained, unit_of_bound, unit_of_value
-from mdstopo.limiting.compare import kept_iterates
+from mdstopo.limiting.compare import kept_iterates, of_last_stage, violations
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.scenery import Floats
 from mdstopo.plots.source import Source
@@ -22,7 +22,8 @@ NOTHING = 1e-12
 
 
 def best_iterate(source: Source) -> int | None:
-    """Which iterate of a run is the design of the file: the best that keeps the limits, else the last.
+    """Which iterate of a run is the design of the file: the best that keeps the limits, else the one that breaks them
+    least.
 
     None where it is no iterate: of a run that was stopped while sizes were chosen.
     """
@@ -34,6 +35,9 @@ def best_iterate(source: Source) -> int | None:
     usable = kept & np.isfinite(combined)
     if usable.any():
         return int(np.where(usable, combined, np.inf).argmin())
+    broken = np.where(of_last_stage(case, view) & np.isfinite(combined), violations(case, view), np.nan)
+    if np.isfinite(broken).any():
+        return int(np.nanargmin(broken))
     return len(combined) - 1 if len(combined) else None
 
 
