@@ -107,7 +107,7 @@ class Sizes:
         everyone = self._was_everyone()
         progress = self._searched(problem, state, everyone, stop, keep, notify)
         everybody = len(self._groups_at())
-        # where none is kept, what is optimal is next to nothing everywhere, and no size is near it
+        # where no member is kept, the continuous optimum is far below every size, and says nothing about their choice
         if progress.finished and progress.x is None and 0 < self._kept < everybody and not everyone:
             before = f"no sizes of the {self._kept} kept keep the constraints"
             notify(f"{before}: now sizes of all {count_text(everybody)} are chosen")

@@ -36,7 +36,7 @@ class TextTable(NamedTuple):
     @property
     def width(self) -> int:
         """How many columns the rows have; without rows those that are named."""
-        return max(map(filled, self.rows), default=len(self.names))
+        return max(map(_filled, self.rows), default=len(self.names))
 
     def title(self, column: int) -> str:
         """What a column is called in messages: its number where the header line names others than there are."""
@@ -45,10 +45,10 @@ class TextTable(NamedTuple):
 
 def text_table(text: str) -> TextTable:
     """The table in the text of a file. Raises ValueError with the line that has no cells."""
-    return _columns(written_lines(text))
+    return _columns(_written_lines(text))
 
 
-def written_lines(text: str) -> list[tuple[int, str]]:
+def _written_lines(text: str) -> list[tuple[int, str]]:
     """The lines of a text that have cells, without remarks, each with its number from 1."""
     written = [
         (number, line)
@@ -67,16 +67,16 @@ def _without_remark(line: str, first: bool) -> str:
 def _columns(written: list[tuple[int, str]]) -> TextTable:
     """The table of lines with their numbers. Raises ValueError with the line that has no cells."""
     lines = [number for number, _ in written]
-    separator = separator_of(written[1:] or written)
+    separator = _separator_of(written[1:] or written)
     has_names = bool(written) and _names_columns(*written[0], separator)
     if not has_names:
-        separator = separator_of(written)
+        separator = _separator_of(written)
     there = written[has_names:]
-    rows = [cells_of(*each, separator) for each in there]
+    rows = [_cells_of(*each, separator) for each in there]
     names = _names(*written[0], separator, rows) if has_names else []
-    if names and separator == "\t" and max(map(filled, rows), default=0) > filled(names):
+    if names and separator == "\t" and max(map(_filled, rows), default=0) > _filled(names):
         # tabs that only align: the header line has as many names as each row has cells if several tabs are one gap
-        spaced = [cells_of(*each, " ") for each in there]
+        spaced = [_cells_of(*each, " ") for each in there]
         apart = _names(*written[0], " ", spaced)
         if {len(row) for row in spaced} == {len(apart)}:
             names, rows, separator = apart, spaced, " "
@@ -87,7 +87,7 @@ def _columns(written: list[tuple[int, str]]) -> TextTable:
     return TextTable(tuple(each.strip("\"'") for each in names), rows, lines[has_names:], separator)
 
 
-def separator_of(lines: Sequence[tuple[int, str]]) -> str:
+def _separator_of(lines: Sequence[tuple[int, str]]) -> str:
     """What stands between columns: the first of semicolon, tab and comma that most lines have, else blanks."""
     bare = [re.sub(_QUOTED, "q", line).strip() for _, line in lines]
     return next((each for each in SEPARATORS if 2 * sum(each in line for line in bare) > len(bare)), " ")
@@ -95,12 +95,12 @@ def separator_of(lines: Sequence[tuple[int, str]]) -> str:
 
 def _names_columns(number: int, line: str, separator: str) -> bool:
     """Whether the first line is a header line: no cell is a number, and neither are they all with other separators."""
-    if any(number_in(cell) is not None for cell in cells_of(number, line, separator)):
+    if any(number_in(cell) is not None for cell in _cells_of(number, line, separator)):
         return False
     return any(number_in(word) is None for word in re.split(r"[;,\s]+", line) if word)
 
 
-def cells_of(number: int, line: str, separator: str) -> list[str]:
+def _cells_of(number: int, line: str, separator: str) -> list[str]:
     """The cells of a line. Raises ValueError with its number."""
     if separator == " ":
         found = re.findall(rf"(?:{_QUOTED}|\S)+", line)
@@ -117,22 +117,22 @@ def cells_of(number: int, line: str, separator: str) -> list[str]:
 
 def _names(number: int, line: str, separator: str, rows: Sequence[Sequence[str]]) -> list[str]:
     """The names in a header line: between what separates rows, or, where that is not in it, what gives as many."""
-    names = cells_of(number, line, separator)
+    names = _cells_of(number, line, separator)
     if separator == " " and "\t" in line.strip():
-        names = [cell for cell in cells_of(number, line, "\t") if cell]
-    width = max(map(filled, rows), default=len(names))
+        names = [cell for cell in _cells_of(number, line, "\t") if cell]
+    width = max(map(_filled, rows), default=len(names))
     if len(names) != width > 1 and (len(names) == 1 or separator == " "):
         gaps = re.sub(r"\s{2,}", "\t", line.strip())
         for each, other in ((line, ";"), (line, "\t"), (line, ","), (gaps, "\t"), (line, " ")):
             if other == " " and "\t" in line:
                 continue  # blanks between tabs belong to names
-            found = [cell for cell in cells_of(number, each, other) if cell]
+            found = [cell for cell in _cells_of(number, each, other) if cell]
             if len(found) == width:
                 return found
     return names
 
 
-def filled(cells: Sequence[str]) -> int:
+def _filled(cells: Sequence[str]) -> int:
     """How many cells there are, without empty ones at the end."""
     return max((k for k, cell in enumerate(cells, start=1) if cell), default=0)
 
@@ -147,13 +147,13 @@ def odd_row(table: TextTable, last: int, named: bool) -> str:
     if not rows or (not named and separator in ";\t"):
         return ""
     header = named or (separator == "," and len(names) > 1)  # a title above the rows counts no columns
-    width = filled(names if header and names else rows[0])
+    width = _filled(names if header and names else rows[0])
     there = f"the {'header line' if header and names else 'first row'} has {width}"
     all_short = named and bool(names) and max(map(len, rows)) < width
     short = separator == " " or (separator == "," and not names) or all_short
     whole = [row for row in rows if len(row) == width]
     for row, line in zip(rows, table.lines, strict=True):
-        found = filled(row)
+        found = _filled(row)
         if found > width:
             remark = width - 1 > last and _is_text(row[width - 1]) and _no_numbers(whole, width - 1)
             if remark or (not named and separator == " " and _is_text(row[width])):

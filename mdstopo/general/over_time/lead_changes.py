@@ -41,7 +41,7 @@ class Pairs(NamedTuple):
     """Pairs of members whose difference may vanish between two samples.
 
     cell (P,): the number of the interval between two samples.
-    rows (2, P): both members, as rows of `Contest.members`.
+    rows (2, P): both members, as rows of `CompetingMembers.members`.
     members (2, P): the same, as rows of the samples.
     sign (P,): 1, or -1 where the forces are equal and opposite.
     """
@@ -84,7 +84,7 @@ def cubics(values: FloatArray, rates: FloatArray) -> Cubics:
     return Cubics(values[0], rates[0], 3.0 * rise - 2.0 * rates[0] - rates[1], rates[0] + rates[1] - 2.0 * rise)
 
 
-class Contest(NamedTuple):
+class CompetingMembers(NamedTuple):
     """The intervals between two samples in which several members come near the largest force.
 
     step (Q,): number of the step among those that are sampled. interval (Q,): of the first of the two samples.
@@ -99,10 +99,12 @@ class Contest(NamedTuple):
     curves: Cubics
     steepest: FloatArray
 
-    def some(self, cells: IndexArray) -> "Contest":
+    def some(self, cells: IndexArray) -> "CompetingMembers":
         """Some of the intervals."""
         curves = self.curves.some(slice(None), cells)
-        return Contest(self.step[cells], self.interval[cells], self.members[:, cells], curves, self.steepest[cells])
+        return CompetingMembers(
+            self.step[cells], self.interval[cells], self.members[:, cells], curves, self.steepest[cells]
+        )
 
 
 def lead_changes(
@@ -115,20 +117,22 @@ def lead_changes(
     fine (K,): fractions of a step at which the samples are.
     exact: forces and rates on the motion itself.
     """
-    contest = _contest(force, rate, may)
-    most, cells = len(contest.members), np.arange(len(contest.step))
+    competing = _competing(force, rate, may)
+    most, cells = len(competing.members), np.arange(len(competing.step))
     portions = np.array_split(cells, max(1, -(-most * most * len(cells) // AT_ONCE)))
-    found = [_changes_in(contest.some(cells), force, fine, exact) for cells in portions]
+    found = [_changes_in(competing.some(cells), force, fine, exact) for cells in portions]
     step, fraction = (np.concatenate(each) for each in zip(*found, strict=True))
     order = np.lexsort([fraction, step])
     return step[order], fraction[order]
 
 
-def _changes_in(contest: Contest, force: FloatArray, fine: FloatArray, exact: Exact) -> tuple[IndexArray, FloatArray]:
-    """Where members of a contest change hands: number of the step (R,), fraction of it (R,); arguments as of
+def _changes_in(
+    competing: CompetingMembers, force: FloatArray, fine: FloatArray, exact: Exact
+) -> tuple[IndexArray, FloatArray]:
+    """Where competing members change hands: number of the step (R,), fraction of it (R,); further arguments as of
     `lead_changes`."""
-    pairs = _pairs(contest, force)
-    a, b = (contest.curves.some(rows, pairs.cell) for rows in pairs.rows)
+    pairs = _pairs(competing, force)
+    a, b = (competing.curves.some(rows, pairs.cell) for rows in pairs.rows)
     difference = Cubics(*(x - pairs.sign * y for x, y in zip(a, b, strict=True)))
     values, rates = difference.ends()
     turns = (values[0] >= 0.0) != (values[1] >= 0.0)
@@ -139,9 +143,9 @@ def _changes_in(contest: Contest, force: FloatArray, fine: FloatArray, exact: Ex
     guess[dips] = lowest
     dips[dips] = passes
     kept = np.flatnonzero(turns | dips)
-    kept = kept[_leads(contest, pairs.some(kept), guess[kept])]
+    kept = kept[_leads(competing, pairs.some(kept), guess[kept])]
     pairs, guess, turns, start = pairs.some(kept), guess[kept], turns[kept], values[0][kept]
-    step, interval = contest.step[pairs.cell], contest.interval[pairs.cell]
+    step, interval = competing.step[pairs.cell], competing.interval[pairs.cell]
     low, width = fine[interval], fine[interval + 1] - fine[interval]
     search = _Search(pairs, step, exact)
     crossed, dipped = np.flatnonzero(turns), np.flatnonzero(~turns)
@@ -155,7 +159,7 @@ def _changes_in(contest: Contest, force: FloatArray, fine: FloatArray, exact: Ex
     return step[which], fraction
 
 
-def _contest(force: FloatArray, rate: FloatArray, may: NDArray[np.bool_]) -> Contest:
+def _competing(force: FloatArray, rate: FloatArray, may: NDArray[np.bool_]) -> CompetingMembers:
     """Where which members come so near the largest force, by their cubics, that they may lead.
 
     Of more than MOST members those with the largest forces. Arguments as of `lead_changes`.
@@ -187,7 +191,9 @@ def _contest(force: FloatArray, rate: FloatArray, may: NDArray[np.bool_]) -> Con
     packed = [np.zeros(shape) for _ in curves]
     for into, each in zip(packed, curves, strict=True):
         into[rank, own] = each[order]
-    return Contest(step[first][contested], interval[first][contested], members, Cubics(*packed), steepest[contested])
+    return CompetingMembers(
+        step[first][contested], interval[first][contested], members, Cubics(*packed), steepest[contested]
+    )
 
 
 def _ranks(groups: IndexArray) -> IndexArray:
@@ -197,15 +203,15 @@ def _ranks(groups: IndexArray) -> IndexArray:
     return np.asarray(place - np.maximum.accumulate(np.where(new, place, 0)))
 
 
-def _pairs(contest: Contest, force: FloatArray) -> Pairs:
+def _pairs(competing: CompetingMembers, force: FloatArray) -> Pairs:
     """All pairs of members in the same interval, with both signs, without those whose forces are the same at all
     samples of the step. force (C, W, K): as of `lead_changes`."""
-    p, q = np.triu_indices(len(contest.members), 1)
-    which, cell = np.nonzero(contest.members[q] >= 0)
+    p, q = np.triu_indices(len(competing.members), 1)
+    which, cell = np.nonzero(competing.members[q] >= 0)
     rows = np.stack([p[which], q[which]])
-    members = contest.members[rows, cell]
+    members = competing.members[rows, cell]
     found: list[Pairs] = []
-    a, b = (force[each, contest.step[cell]] for each in members)
+    a, b = (force[each, competing.step[cell]] for each in members)
     largest = np.maximum(np.abs(a).max(axis=-1), np.abs(b).max(axis=-1))
     for sign in (1.0, -1.0):
         kept = np.abs(a - sign * b).max(axis=-1) > TIE * largest
@@ -236,23 +242,23 @@ def _turning(curves: Cubics) -> tuple[FloatArray, NDArray[np.bool_]]:
     return np.clip(x, 0.0, 1.0), passes
 
 
-def _leads(contest: Contest, pairs: Pairs, guess: FloatArray) -> NDArray[np.bool_]:
+def _leads(competing: CompetingMembers, pairs: Pairs, guess: FloatArray) -> NDArray[np.bool_]:
     """Whether a pair is near the largest force where its difference vanishes or turns round, or comes near zero.
 
     guess (P,): where between both samples it does.
     """
-    a, b = (contest.curves.some(rows, pairs.cell) for rows in pairs.rows)
+    a, b = (competing.curves.some(rows, pairs.cell) for rows in pairs.rows)
     near = np.zeros(len(guess), dtype=bool)
-    steepest = contest.steepest[pairs.cell]
+    steepest = competing.steepest[pairs.cell]
     # cubics of forces that are nearly the same meet anywhere: not only where the guess is
     for x in PLACES.tolist():
-        largest = np.abs(contest.curves.at(x)).max(axis=0, initial=0.0)[pairs.cell]
+        largest = np.abs(competing.curves.at(x)).max(axis=0, initial=0.0)[pairs.cell]
         slack = 2.0 * (CLOSE * largest + OFF * steepest)
         own, other = a.at(x), b.at(x)
         near |= (np.abs(own - pairs.sign * other) <= slack) & (np.abs(own) >= largest - slack)
     largest = np.zeros(len(guess))
-    for row in range(len(contest.members)):
-        largest = np.maximum(largest, np.abs(contest.curves.some(row, pairs.cell).at(guess)))
+    for row in range(len(competing.members)):
+        largest = np.maximum(largest, np.abs(competing.curves.some(row, pairs.cell).at(guess)))
     slack = 2.0 * (CLOSE * largest + OFF * steepest)
     found: NDArray[np.bool_] = near | (np.abs(a.at(guess)) >= largest - slack)
     return found
