@@ -193,7 +193,10 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         out: FloatArray,
         prices: FloatArray,
     ) -> None:
-        """See `CandidatePass.fill_tiles`; few: of each run, or of none."""
+        """Price tiles.
+
+        states, common, which, out, prices: as of `CandidatePass.fill_tiles`. few: of each run, or of none.
+        """
         packed = (*self._packed_scene(states), *self._packed(states, self.chosen, few))
         kernels.price_tiles(*packed, *self.smoothness(states), common, *self.by_tile, which, allowed(), out, prices)
 
