@@ -9,10 +9,12 @@ from mdstopo.case.laws import Law
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.compiler.threads import allowed
 from mdstopo.general.design.followed_member import AT_NODES, degree_of
+from mdstopo.general.driver.fewer_states import CHANGE, FewerStates, all_stages, fewer_states
 from mdstopo.general.driver.row_gradients import sign_of, wanted_rows
 from mdstopo.general.model.general_model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
 from mdstopo.general.model.priced_candidates import (
     ARRAYS,
+    BEHIND_FEW,
     FIELDS,
     FIRST_NODE,
     FOLLOWED,
@@ -27,6 +29,7 @@ from mdstopo.general.model.priced_candidates import (
 )
 from mdstopo.general.pricing import candidate_prices as kernels
 from mdstopo.general.pricing.pricing_states import OF_A_ROW, keep_states, states_of_sum
+from mdstopo.general.pricing.sampled_works import sample_works
 from mdstopo.general.responses.extremes import COLUMNS, FRACTION, RATE, STEP
 from mdstopo.general.scene.compile_general import GeneralScene
 from mdstopo.general.scene.dimension import dimension_of, in_frame
@@ -38,6 +41,7 @@ from mdstopo.scene.bodies import stands_as
 from mdstopo.scene.origin import starting_places
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.sensitivity.candidate_pass import SMOOTH_ERROR, CandidatePass
+from mdstopo.sensitivity.springs_candidate_prices import ERROR, TILE_NUMBERS
 from mdstopo.sensitivity.tile_interpolation import PLACES, ROOM
 
 if TYPE_CHECKING:
@@ -46,6 +50,10 @@ if TYPE_CHECKING:
 #: by how much of the simulated time it is before the end of a step that decides in which mode a candidate is there: a
 #: built one switches there at most by rounding earlier
 SIDE = 1e-8
+#: tiles from which on it pays to look for fewer states, and of how many candidates some tell which do
+MANY_TILES, TELLING = 1000, 256
+#: tiles whose prices are compared, and by how much they may differ, relative to what a pass may be off
+COMPARED_TILES, SHARE_OF_FEWER = 8, 0.2
 
 
 class ScenePricingStates(NamedTuple):
@@ -168,12 +176,28 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         super().__init__(group, homes, group.body_to == GROUND, count)
         self._places = tuple(places)
         self._last: tuple[PricingStates, tuple[IndexArray, FloatArray]] | None = None
+        self._few: tuple[PricingStates, list[FewerStates | None]] | None = None
 
     def fill_tiles(
         self, states: PricingStates, common: FloatArray, which: IndexArray, out: FloatArray, prices: FloatArray
     ) -> None:
         """See `CandidatePass.fill_tiles`."""
-        packed = (*self._packed_scene(states), *self._packed(states, self.chosen))
+        self._fill_tiles(states, common, which, self._fewer(states, common), out, prices)
+
+    def _fill_tiles(
+        self,
+        states: PricingStates,
+        common: FloatArray,
+        which: IndexArray,
+        few: list[FewerStates | None],
+        out: FloatArray,
+        prices: FloatArray,
+    ) -> None:
+        """Price tiles.
+
+        states, common, which, out, prices: as of `CandidatePass.fill_tiles`. few: of each run, or of none.
+        """
+        packed = (*self._packed_scene(states), *self._packed(states, self.chosen, few))
         kernels.price_tiles(*packed, *self.smoothness(states), common, *self.by_tile, which, allowed(), out, prices)
 
     def prices_between(self, states: PricingStates, a: IndexArray, b: IndexArray) -> FloatArray:
@@ -204,6 +228,44 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         laws = (law for scene in states.scenes for place in self._places for law in scene.case.members[place].laws)
         return SMOOTH_ERROR if all(_is_even(law) for law in laws) else 0.0
 
+    def _fewer(self, states: PricingStates, common: FloatArray) -> list[FewerStates | None]:
+        """Of each run the fewer states for passes; empty where there are few tiles, or prices would not be the same.
+
+        common: as of `fill_tiles`.
+        """
+        if common[ERROR] == 0.0 or self.shape[0] * self.shape[1] < MANY_TILES:
+            return []
+        if self._few is None or self._few[0] is not states:
+            found = self._find_fewer(states)
+            self._few = states, found if self._is_same(states, common, found) else []
+        return self._few[1]
+
+    def _find_fewer(self, states: PricingStates) -> list[FewerStates | None]:
+        """Of each run the fewer states, or None where its law is not made for them; empty where there are none."""
+        scene, packed = self._packed_scene(states), self._packed(states, self.chosen)
+        runs = [run for each in states.scenes for place in self._places for run in _runs(each, place)]
+        rng = np.random.default_rng(1)
+        places = np.stack([rng.integers(0, len(numbers), TELLING) for numbers in self.chosen])
+        found: list[FewerStates | None] = []
+        for k, run in enumerate(runs):
+            change = run.change[:, 0]
+            works = np.empty((len(run.when), CHANGE + change.shape[1], TELLING))
+            degree = sample_works(*scene, *packed, k, places, works) if len(run.step) else 0
+            found.append(fewer_states(run.step, works, degree, change, run.energy) if degree else None)
+        return found if any(own is not None and len(own.state) for own in found) else []
+
+    def _is_same(self, states: PricingStates, common: FloatArray, few: list[FewerStates | None]) -> bool:
+        """Whether prices with fewer states are those with all, of some tiles."""
+        if not few:
+            return True
+        count = self.shape[0] * self.shape[1]
+        which = (np.arange(COMPARED_TILES) * count + count // 2) // COMPARED_TILES
+        out, prices = np.empty((COMPARED_TILES, TILE_NUMBERS)), np.empty((2, COMPARED_TILES, PLACES))
+        self._fill_tiles(states, common, which, [], out, prices[0])
+        self._fill_tiles(states, common, which, few, out, prices[1])
+        own, others = prices[:, np.isfinite(prices[0])]
+        return bool(np.abs(others - own).max(initial=0.0) <= SHARE_OF_FEWER * common[ERROR])
+
     def _packed_scene(self, states: PricingStates) -> tuple[IndexArray, FloatArray]:
         """A packed scene with room for the members of a tile, and for the numbers of any of the scenes' laws."""
         scene, model = states.scenes[0].scene, states.scenes[0].model
@@ -220,9 +282,15 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         return pack_general(with_tile, scene.kinematics)
 
     def _packed(
-        self, states: PricingStates, chosen: tuple[IndexArray | slice, IndexArray | slice]
+        self,
+        states: PricingStates,
+        chosen: tuple[IndexArray | slice, IndexArray | slice],
+        few: Sequence[FewerStates | None] = (),
     ) -> tuple[IndexArray, FloatArray]:
-        """A packed `priced_candidates.PricedCandidates`; chosen: which points of both grids."""
+        """A packed `priced_candidates.PricedCandidates`.
+
+        chosen: which points of both grids. few: of each run, or of none.
+        """
         parts = [(scene, place) for scene in states.scenes for place in self._places]
         curves = np.zeros((len(parts), _most_curves(states)))
         points: list[list[FloatArray]] = []
@@ -233,11 +301,15 @@ class GeneralCandidates(CandidatePass[PricingStates]):
             curves[number, : len(scene.model.curves)] = scene.model.curves
             points.append(self._points(scene, place, chosen))
             for run in _runs(scene, place):
+                own = few[len(runs)] if few else None
+                if own is not None:
+                    run = _with_fewer(run, own)
                 code, before, modes = run.row
                 ends = state + len(run.when), step + len(run.step)
                 rows.append([number, code, state, state + before, ends[0], step, ends[1], modes])
                 run.step[:, :FIRST_NODE] += state
                 run.step[:, FIRST_NODE] += node
+                run.few[run.few[..., BEHIND_FEW] > 0] += state
                 runs.append(run)
                 (state, step), node = ends, node + len(run.node_pose)
         arrays: tuple[Any, ...] = (
@@ -301,6 +373,8 @@ class _Run(NamedTuple):
     node_level: FloatArray
     node_energy: FloatArray
     node_frame: FloatArray
+    few: IndexArray
+    nearest: FloatArray
 
 
 def _runs(scene: ScenePricingStates, place: int) -> list[_Run]:
@@ -336,11 +410,28 @@ def _run_of(scene: ScenePricingStates, k: int, record: Law) -> _Run:
         parts = _no_steps(pose.shape[1], change.shape[1], frame.shape[1])
     else:
         parts = _steps_of_law(steps, model, k, pair, kinematics)
+    parts = (*parts, *all_stages(parts[0]))
     return _Run(
         (code, before, modes), -1.0 if free is None else float(free), model.law[k],
         pose[:, None], change[:, None], scene.pose_a[states, pair], scene.energy[states],
         scene.when[states], level, frame if modes != NONE else np.zeros_like(frame), *parts,
     )  # fmt: skip
+
+
+def _with_fewer(run: _Run, own: FewerStates) -> _Run:
+    """A run with other states behind its own, over which forces are summed."""
+    kept: dict[str, Any] = {
+        name: np.concatenate([values, values[own.state]])
+        for name in ("pose", "pose_a", "when", "level", "frame")
+        for values in [getattr(run, name)]
+    }
+    return run._replace(
+        **kept,
+        change=np.concatenate([run.change, own.change[:, None]]),
+        energy=np.concatenate([run.energy, own.energy]),
+        few=own.few.copy(),
+        nearest=own.nearest,
+    )
 
 
 def _frames(kinematics: Kinematics, poses: FloatArray) -> FloatArray:

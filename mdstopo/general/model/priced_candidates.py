@@ -19,6 +19,10 @@ NONE, FOLLOWED = range(2)
 #: columns of `PricedCandidates.step`, and what a step may be
 FIRST_STAGE, LAST_STAGE, FIRST_NODE, KIND, MOVES = range(5)
 WHOLE, PART, POINT = range(3)
+#: how many steps behind each other may have states together: 1, 2, 4 and so on, so many of these; columns of
+#: `PricedCandidates.few`
+TOGETHER_LEVELS = 5
+FIRST_FEW, BEHIND_FEW = range(2)
 #: fractions of a step at which a member that switches is sampled (Gauss and Lobatto), and what makes of values there
 #: the coefficients of the polynomial through all, by powers of twice the fraction less one
 NODES = 6
@@ -28,7 +32,7 @@ POWERS = np.ascontiguousarray(np.linalg.inv(np.vander(2.0 * NODE - 1.0, increasi
 #: arrays of states in `PricedCandidates`, and of steps and nodes
 ARRAYS = (
     "pose", "change", "pose_a", "energy", "when", "level", "frame", "step", "step_time", "node_pose", "node_a",
-    "node_change", "node_level", "node_energy", "node_frame",
+    "node_change", "node_level", "node_energy", "node_frame", "few", "nearest",
 )  # fmt: skip
 
 
@@ -88,6 +92,22 @@ class PricedCandidates(NamedTuple):
         FloatArray, Field("n_node", "those of the weight of the stored energy, by the fraction of the step")
     ]
     node_frame: Annotated[FloatArray, Field("n_node, n_frame", "how ends move there (`Kinematics.frames`)")]
+    few: Annotated[
+        IndexArray,
+        Field(
+            f"n_step, {TOGETHER_LEVELS}, 2",
+            "of each step, and of the 2, 4 and so on behind each other of which it is the first: the first of the "
+            "states over which smooth forces are summed, and the one behind the last: the stages of a single step, "
+            "fewer than these of several (`driver.fewer_states`); both 0 where these have none together",
+        ),
+    ]
+    nearest: Annotated[
+        FloatArray,
+        Field(
+            f"n_step, {TOGETHER_LEVELS}",
+            "for which candidates these states will do: those whose inverse length (1/m) is no larger at the first one",
+        ),
+    ]
     first: Annotated[FloatArray, Field("n_scene, n_axis, n_first", "points of the one grid in their body's frame (m)")]
     second: Annotated[FloatArray, Field("n_scene, n_axis, n_second", "points of the other grid, likewise")]
     first_home: Annotated[FloatArray, Field("n_scene, n_axis, n_first", "the points of the one grid at the start (m)")]

@@ -17,10 +17,8 @@ from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.priced_candidates import (
     CODE,
     FIRST_NODE,
-    FIRST_STAGE,
     FIRST_STEP,
     KIND,
-    LAST_STAGE,
     LAST_STEP,
     MOVES,
     NODES,
@@ -28,7 +26,7 @@ from mdstopo.general.model.priced_candidates import (
     WHOLE,
 )
 from mdstopo.general.pricing.certain_modes import FASTEST, HIGH, LOW, SLOWEST, UNSURE
-from mdstopo.general.pricing.loaded_members import loaded_at
+from mdstopo.general.pricing.loaded_members import loaded_at, steps_together
 from mdstopo.general.pricing.priced_tile import SETS, add_points, load_tile, set_share
 from mdstopo.general.pricing.sorted_members import (
     CLASSES,
@@ -271,7 +269,7 @@ def _is_enough(tile, few):
     """Whether elongations and rates of all members of a part follow from those of a few of them.
 
     Only the last node of each step is looked at: positions are smooth over a step. What is left out inside is caught
-    for sums by `_sum_stages`, for modes by SURE.
+    for sums by `_sum_steps`, for modes by SURE.
 
     tile, few: as of `_choose`.
     """
@@ -319,6 +317,9 @@ def _follow_part(tile, first, few):
     run = candidates.run[tile.k]
     has_modes = False
     has_whole_step = False
+    # steps in which all members have stayed in a mode since any changed, and that are not priced yet
+    begin = np.int64(0)
+    behind = np.int64(0)
     # 1 behind a part of a step: the modes and permanent sets then are in row 1
     behind_part = np.int64(0)
     done = 0.0
@@ -332,12 +333,30 @@ def _follow_part(tile, first, few):
         if not has_modes:
             _begin(tile, s, first, few)
             has_modes = True
+        has_whole_step = has_whole_step or kind == WHOLE
+        behind_part = np.int64(kind != WHOLE)
+        mode = few.row_mode[0]
+        stay = _all_in_mode(tile, s, few)
+        if stay and kind == WHOLE:
+            if candidates.step[s, MOVES] == 0 or law_is_idle(run[CODE], mode):
+                continue
+            if s == behind:
+                behind += 1
+                continue
+        done += _price_together(tile, begin, behind, first, few)
+        behind = begin
+        if stay and kind == WHOLE:
+            begin = np.int64(s)
+            behind = begin + 1
+            continue
         # `fresh` is `sets[0]` here; a row with a `row_class` changes neither in the step
-        _sort_part(tile, s, first, few)
+        if stay:
+            _join_all(tile, mode, first, few)
+        else:
+            _sort_part(tile, s, first, few)
         done += _price_classes(tile, s, first, few)
         _end_step(tile, s, first, few)
-        behind_part = np.int64(kind != WHOLE)
-        has_whole_step = has_whole_step or kind == WHOLE
+    done += _price_together(tile, begin, behind, first, few)
     tile.sorting.row_class[:] = UNSORTED
     for a in range(tile.height):
         _spread_row(few.total[a], few)
@@ -396,10 +415,65 @@ def _note_row(tile, a, first, few):
 
 
 @kernel
+def _all_in_mode(tile, s, few):
+    """Whether all members of a part are in one mode, and bounds tell that they stay in it in a step.
+
+    tile, few: as of `_choose`; what the few do at the nodes is set. s: number of the step.
+    """
+    model, candidates, k = tile.model, tile.candidates, tile.k
+    o = candidates.step[s, FIRST_NODE]
+    count = few.size[FEW_ROWS] * COLUMN_NODES
+    for m in range(1, NODES):
+        member_works(
+            model, np.int64(FEW_AT), count, candidates.node_pose[o + m], candidates.node_change[o + m], few.works[m]
+        )
+    if few.size[BETWEEN_ROWS] == 0 or not _is_of_one_mode(few):
+        return False
+    _bound_all(few)
+    return _all_stay(
+        candidates.run[k, CODE], candidates.law[k], model.curves, candidates.step_time[s, 0], few.row_mode[0],
+        few.part_box,
+    )  # fmt: skip
+
+
+@kernel
+def _join_all(tile, mode, first, few):
+    """Put all members of a part into the class of those that stay in a mode.
+
+    tile, first, few: as of `_choose`; the tile's sorting is filled. mode: the mode.
+    """
+    classes, kind, row_class = tile.sorting.classes, tile.sorting.kind, tile.sorting.row_class
+    size = few.size[PART_COLUMNS]
+    classes[:] = 0
+    own = join_class(mode, mode, size * tile.height, classes)
+    row_class[:] = own
+    for a in range(tile.height):
+        kind[a * BROAD + first : a * BROAD + first + size] = own
+
+
+@kernel
+def _price_together(tile, begin, behind, first, few):
+    """Price the members of a part in steps behind each other in which all stay in one mode.
+
+    tile, first, few: as of `_choose`. begin, behind: the first step, and the one behind the last; none where equal.
+
+    Returns how many prices of steps were computed.
+    """
+    if begin == behind:
+        return 0.0
+    _join_all(tile, few.row_mode[0], first, few)
+    have_prices, done = _price_staying(tile, begin, behind, first, np.int64(0), few)
+    if not have_prices:
+        for s in range(begin, behind):
+            done += _price_classes(tile, s, first, few)
+    return done
+
+
+@kernel
 def _sort_part(tile, s, first, few):
     """Sort the members of a part by what they do in a step.
 
-    tile, first, few: as of `_choose`; the tile's sorting is filled.
+    tile, first, few: as of `_choose`, with what the few do at the nodes; the tile's sorting is filled.
     s: number of the step.
     """
     model, candidates, k, sorting = tile.model, tile.candidates, tile.k, tile.sorting
@@ -407,24 +481,9 @@ def _sort_part(tile, s, first, few):
     code = candidates.run[k, CODE]
     p = candidates.law[k]
     t = candidates.step_time[s, 0]
-    o = candidates.step[s, FIRST_NODE]
     size = few.size[PART_COLUMNS]
-    count = few.size[FEW_ROWS] * COLUMN_NODES
-    for m in range(1, NODES):
-        member_works(
-            model, np.int64(FEW_AT), count, candidates.node_pose[o + m], candidates.node_change[o + m], few.works[m]
-        )
     classes[:] = 0
     near = np.int64(0)
-    if few.size[BETWEEN_ROWS] != 0 and _is_of_one_mode(few):
-        mode = few.row_mode[0]
-        _bound_all(few)
-        if _all_stay(code, p, model.curves, t, mode, few.part_box):
-            own = join_class(mode, mode, size * tile.height, classes)
-            row_class[:] = own
-            for a in range(tile.height):
-                kind[a * BROAD + first : a * BROAD + first + size] = own
-            return
     _move_rows(tile.height, few)
     for a in range(tile.height):
         box = few.box[a]
@@ -603,7 +662,8 @@ def _sort_row(tile, s, a, first, box, few, near):
     begin = a * BROAD + first
     _move_members(a, first, few, sets, sorting.works)
     count = np.int64(0)
-    for b in range(begin, begin + size):
+    alike = few.row_mode[a] != UNSURE
+    for b in range(begin, begin + (1 if alike else size)):
         count = try_mode(modes[0, b], count, tried)
     fill_tangents(
         tile.candidates.run[tile.k, CODE], tile.candidates.law[tile.k], tile.model.curves,
@@ -614,7 +674,7 @@ def _sort_row(tile, s, a, first, box, few, near):
         left = (1 << lanes()) - 1
         for n in range(count):
             bits = stay_in(n, b, np.int64(1), sorting) & left
-            for lane in range(lanes() if bits != 0 else 0):
+            for lane in range(lanes() if bits != 0 and not alike else 0):
                 if modes[0, begin + b + lane] != tried[n]:
                     bits &= ~(1 << lane)
             if bits == 0:
@@ -658,7 +718,7 @@ def _price_classes(tile, s, first, few):
             if candidates.step[s, MOVES] == 0 or law_is_idle(candidates.run[k, CODE], classes[c, FROM]):
                 continue
             if classes[c, COUNT] > ONE_BY_ONE:
-                have_prices, computed = _price_staying(tile, s, first, c, few)
+                have_prices, computed = _price_staying(tile, s, s + 1, first, c, few)
                 done += computed
                 if have_prices:
                     continue
@@ -667,12 +727,12 @@ def _price_classes(tile, s, first, few):
 
 
 @kernel
-def _price_staying(tile, s, first, c, few):
-    """Price members of a part that stay in a mode from what the few would do in it.
+def _price_staying(tile, begin, behind, first, c, few):
+    """Price members of a part that stay in a mode in some steps from what the few would do in it.
 
     Force and energy are polynomials of the second degree at most in a member's permanent set.
 
-    tile, first, few: as of `_choose`. s, c: numbers of the step and of the class.
+    tile, first, few: as of `_choose`. begin, behind: as of `_price_together`. c: the class.
 
     Returns whether they have their prices, not where what they do is not smooth enough, and how many were computed.
     """
@@ -690,9 +750,9 @@ def _price_staying(tile, s, first, c, few):
                 if kind[b] == c:
                     low = min(low, sets[0, b])
                     high = max(high, sets[0, b])
-    count = np.int64(SETS if low != high and _knows_sets(tile, s, mode) else 1)
+    count = np.int64(SETS if low != high and _knows_sets(tile, begin, mode) else 1)
     computed = 1.0 * count * few.size[FEW_ROWS] * COLUMN_NODES
-    if not _sum_stages(tile, s, mode, low, high, count, few) <= SHARE_OF_A_CLASS * tile.error:
+    if not _sum_steps(tile, begin, behind, mode, low, high, count, few) <= SHARE_OF_A_CLASS * tile.error:
         return False, computed
     for a in range(tile.height):
         if row_class[a] != c and row_class[a] != UNSORTED:
@@ -702,16 +762,16 @@ def _price_staying(tile, s, first, c, few):
             for b in range(COLUMN_NODES):
                 few.total[a, b] += few.row_sum[0, b]
             continue
-        begin = a * BROAD + first
+        at = a * BROAD + first
         for n in range(count):
             _spread_row(few.row_sum[n], few)
             for b in range(size):
-                if kind[begin + b] == c:
+                if kind[at + b] == c:
                     share = 1.0
                     if count > 1:
-                        t = 2.0 * (sets[0, begin + b] - low) / (high - low) - 1.0
+                        t = 2.0 * (sets[0, at + b] - low) / (high - low) - 1.0
                         share = set_share(n, t)
-                    price[begin + b] += share * few.row_values[b]
+                    price[at + b] += share * few.row_values[b]
     return True, computed
 
 
@@ -734,19 +794,39 @@ def _knows_sets(tile, s, mode):
 
 
 @kernel
-def _sum_stages(tile, s, mode, low, high, count, few):
-    """What the few would do in a step in a mode, with some permanent sets.
+def _sum_steps(tile, begin, behind, mode, low, high, count, few):
+    """What the few would do in some steps in a mode, with some permanent sets.
 
-    tile, few: as of `_choose`; the sums are set. s, mode: numbers of the step and of the mode.
+    tile, few: as of `_choose`; the sums are set. begin, behind: as of `_price_together`. mode: the mode.
     low, high, count: the least and the largest of the sets (m), and how many there are.
 
     Returns by how much what follows for other members may be off.
     """
+    members = few.size[FEW_ROWS] * COLUMN_NODES
+    few.sums[:count] = 0.0
+    s = begin
+    while s < behind:
+        taken, first, last = steps_together(
+            tile.model, tile.candidates, s, behind - s, np.int64(FEW_AT), members, few.now
+        )
+        _add_states(tile, first, last, mode, low, high, count, few)
+        s += taken
+    worst = 0.0
+    for n in range(count):
+        worst = worse(worst, _worst_tail(few.sums[n], few))
+    return worst
+
+
+@kernel
+def _add_states(tile, first, behind, mode, low, high, count, few):
+    """Add what the few would do at some states to their sums.
+
+    tile, mode, low, high, count, few: as of `_sum_steps`. first, behind: the first state, and the one behind the last.
+    """
     model, candidates, k, following, now = tile.model, tile.candidates, tile.k, tile.following, few.now
     code = candidates.run[k, CODE]
     members = few.size[FEW_ROWS] * COLUMN_NODES
-    few.sums[:count] = 0.0
-    for o in range(candidates.step[s, FIRST_STAGE], candidates.step[s, LAST_STAGE]):
+    for o in range(first, behind):
         member_works(model, np.int64(FEW_AT), members, candidates.pose[o, 0], candidates.change[o, 0], now)
         for n in range(count):
             less = low if n == 0 else 0.5 * (high - low)
@@ -756,10 +836,6 @@ def _sum_stages(tile, s, mode, low, high, count, few):
                 code, candidates.law[k], model.curves, candidates.when[o], candidates.level[o], candidates.energy[o],
                 now, members, mode, following.node, following.power, few.sums[n],
             )  # fmt: skip
-    worst = 0.0
-    for n in range(count):
-        worst = worse(worst, _worst_tail(few.sums[n], few))
-    return worst
 
 
 @kernel

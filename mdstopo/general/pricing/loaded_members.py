@@ -4,9 +4,9 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.model.general_model import MEMBER_EXCESS, MEMBER_FREE_LENGTH
-from mdstopo.general.model.priced_candidates import CODE, SCENE
-from mdstopo.general.pricing.switching_prices import add_in_mode, add_polynomial
-from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, member_works
+from mdstopo.general.model.priced_candidates import BEHIND_FEW, CODE, FIRST_FEW, SCENE, TOGETHER_LEVELS
+from mdstopo.general.pricing.switching_prices import add_in_mode, add_polynomial, range_of
+from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, INVERSE, member_works
 from mdstopo.mechanics.laws.law_table import law_degree
 from mdstopo.sensitivity.tile_interpolation import BROAD, PLACES, TALL, extent
 
@@ -80,6 +80,33 @@ def take_members(model, places, count, behind):
             member[d, m] = member[d, loaded_at(places[m])]
         for m in range(count, behind):
             member[d, m] = member[d, 0]
+
+
+@kernel
+def steps_together(model, candidates, s, count, at, members, works):
+    """The states over which members in one mode are summed in some steps, as few as will do.
+
+    In:
+      model: with the members.
+      candidates, s: a `PricedCandidates`, and the number of the first step.
+      count: how many steps there are from it on, 1 or more.
+      at, members: the first member, and how many there are.
+    Out:
+      works (WORKS, members or more): overwritten.
+
+    Returns for how many of the steps they are, the first state, and the one behind the last.
+    """
+    level = np.int64(TOGETHER_LEVELS - 1)
+    while level > 0:
+        first = candidates.few[s, level, FIRST_FEW]
+        behind = candidates.few[s, level, BEHIND_FEW]
+        if 1 << level <= count and behind > first:
+            member_works(model, at, members, candidates.pose[first, 0], candidates.change[first, 0], works)
+            _, most = range_of(works[INVERSE], members)
+            if most <= candidates.nearest[s, level]:
+                return 1 << level, first, behind
+        level -= 1
+    return np.int64(1), candidates.few[s, 0, FIRST_FEW], candidates.few[s, 0, BEHIND_FEW]
 
 
 @kernel

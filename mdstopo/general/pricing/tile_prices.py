@@ -15,19 +15,18 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.model.priced_candidates import (
     CODE,
-    FIRST_STAGE,
     FIRST_STEP,
     KIND,
-    LAST_STAGE,
     LAST_STEP,
     MOVES,
     POINT,
     SCENE,
+    TOGETHER_LEVELS,
     WHOLE,
 )
 from mdstopo.general.pricing.certain_modes import LEAVES, UNSURE, fill_spans, modes_at_nodes, modes_in_step
 from mdstopo.general.pricing.followed_by_few import follow_parts, goes_by_few
-from mdstopo.general.pricing.loaded_members import add_states, load_members
+from mdstopo.general.pricing.loaded_members import add_states, load_members, steps_together
 from mdstopo.general.pricing.priced_tile import (
     LEAST,
     LISTED_PARTS,
@@ -376,9 +375,12 @@ def _add_listed(tile, part, kept, members):
     values = found_prices(tile.scratch)
     run = candidates.run[k]
     yes = np.bool_(True)
-    for n in range(lists.count[part]):
+    n = np.int64(0)
+    while n < lists.count[part]:
         known = lists.told[part, n]
         s = run[FIRST_STEP] + lists.step[part, n]
+        alike = _alike_behind(lists, part, n)
+        n += 1
         if known <= LEAVES:
             following.modes[0] = LEAVES - known
             following.sets[0] = kept
@@ -389,9 +391,27 @@ def _add_listed(tile, part, kept, members):
                     values[at : at + wide],
                 )  # fmt: skip
             continue
-        o = candidates.step[s, FIRST_STAGE]
-        behind = candidates.step[s, LAST_STAGE]
+        taken, o, behind = steps_together(model, candidates, s, alike, np.int64(0), members, lists.works)
+        n += taken - 1
         following.sets[0, 0] = kept
         add_states(
             model, candidates, k, o, behind, members, known, following.sets[0, :1], lists.works, following, values
         )
+
+
+@kernel
+def _alike_behind(lists, part, n):
+    """How many steps that are listed for a part, from the one at place n on, are behind each other and have the same
+    told of them; as many as may have states together at most.
+
+    lists: a `StepLists`.
+    """
+    count = np.int64(1)
+    while (
+        count < 1 << (TOGETHER_LEVELS - 1)
+        and n + count < lists.count[part]
+        and lists.step[part, n + count] == lists.step[part, n] + count
+        and lists.told[part, n + count] == lists.told[part, n]
+    ):
+        count += 1
+    return count
