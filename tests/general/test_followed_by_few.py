@@ -7,9 +7,10 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from mdstopo.general.pricing import followed_by_few
-from mdstopo.general.pricing.certain_modes import FASTEST, HIGH, LOW, SLOWEST
+from mdstopo.general.pricing.certain_modes import FASTEST, HIGH, LOW, SLOWEST, UNSURE
+from mdstopo.general.pricing.sorted_members import CORNERS, SURE
 from mdstopo.mechanics.kinematics.kinematics_interface import ELONGATION, RATE
-from mdstopo.sensitivity.tile_interpolation import BROAD, COLUMN_NODE, COLUMN_NODES, ROW_NODE, ROW_NODES, TALL
+from mdstopo.sensitivity.tile_interpolation import BROAD, COLUMN_NODE, COLUMN_NODES, ROW_NODE, ROW_NODES, SHORT, TALL
 from tests.space.in_python import in_python
 
 __all__ = ["in_python"]
@@ -89,3 +90,36 @@ def test_bounds_of_members_whose_elongations_are_linear_in_both_points_are_those
         low, high = each.min(axis=1), each.max(axis=1)
         expected = np.transpose([low - sets.max(axis=1), high - sets.min(axis=1), low, high])
         assert np.abs(box - expected).max() <= ROUNDING
+
+
+@pytest.mark.parametrize("bend", [0.0, 2e-3], ids=["on a line", "bent"])
+@pytest.mark.parametrize("level", [0, 2])
+def test_groups_of_columns_that_stay_by_bounds_have_no_member_that_leaves_its_mode(few, level, bend):
+    rng = np.random.default_rng(level)
+    size = BROAD >> level
+    columns = np.arange(float(size))
+    followed_by_few._fill_columns(columns, 0, level, few)
+    followed_by_few._fill_rows(np.arange(float(TALL)), 0, TALL, 0, few)
+    share, off = np.arange(TALL)[:, None] / (TALL - 1), 2.0 * columns / (size - 1) - 1.0
+    sets = 1e-3 * rng.uniform(size=(TALL, size))
+    groups = sets.reshape(TALL, -1, SHORT)
+    few.group_set[:, 0, : size // SHORT], few.group_set[:, 1, : size // SHORT] = groups.min(axis=2), groups.max(axis=2)
+    few.group_mode[:] = np.where(rng.uniform(size=few.group_mode.shape) < 0.2, UNSURE, 1)
+    # elongations and rates go through zero somewhere in most rows, elsewhere at each node of the step
+    motion = 0.05 * (off * size / BROAD + 1.6 * share - 0.8) + bend * off**2 + 4e-3 * np.arange(6)[:, None, None]
+    values = motion[:, ROW_NODE[0, : ROW_NODES[0]]][..., COLUMN_NODE[level]].reshape(6, 1, -1)
+    few.works[:, [ELONGATION, RATE], : values.shape[2]] = values
+    followed_by_few._move_rows(TALL, few)
+    # the lesser of elongation and of what is left of rate, above zero
+    tangent = np.zeros((1, CORNERS, 3))
+    tangent[0, ::2], tangent[0, 1::2] = [0.0, 1.0, 0.0], [0.06, 0.0, -1.0]
+    sorting = SimpleNamespace(tangent=tangent, tried=np.array([1]))
+    margin = np.minimum(motion - sets, 0.06 - motion)[1:].min(axis=0).reshape(TALL, -1, SHORT).min(axis=2)
+    sure = [
+        [followed_by_few._sure_groups(a, 1, few, sorting) >> g & 1 for g in range(size // SHORT)] for a in range(TALL)
+    ]
+    sure, alike = np.array(sure) == 1, few.group_mode[:, : size // SHORT] == 1
+    assert 0 < sure.sum() < (margin > SURE).sum() < sure.size
+    assert not (sure & ((margin <= SURE) | ~alike)).any()
+    # bounds are too low by the range of sets and by what a row may be off its line
+    assert sure[alike & (margin > 1e-3 + (1.0 + few.between[followed_by_few.BY_COLUMNS]) * bend)].all()

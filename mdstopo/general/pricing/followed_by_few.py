@@ -2,9 +2,11 @@
 
 Each member has a mode and a permanent set of its own, and leaves the mode when it is time. But elongation and rate are
 smooth in where its ends are, whatever it does: those of all members of a part follow from a few
-(`sensitivity.tile_interpolation`), for each row of the part first, and within a row only where not all of it stays in
-its mode. So the members that stay are known, and what they do follows from these few, too. All others, those near a
-switch, are looked at and priced by themselves (`sorted_members`, `sorted_prices`).
+(`sensitivity.tile_interpolation`). Bounds tell first of the part, then of each row, and then of groups of SHORT columns
+of a row whether all members stay in their mode; elongations and rates of single members are formed only in what is
+left. So the mode in which each begins and ends a step is known, and what those that stay do follows from these few,
+too. Members so near to a switch that it does not tell are looked at by themselves (`sorted_members`), and those that
+leave their mode are followed (`sorted_prices`).
 """
 
 from typing import Any
@@ -12,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.compiler.vector import lanes, larger, largest, load, magnitude, store, zero
+from mdstopo.compiler.vector import lanes, larger, largest, load, magnitude, negative, store, zero
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.priced_candidates import (
     CODE,
@@ -29,6 +31,9 @@ from mdstopo.general.pricing.certain_modes import FASTEST, HIGH, LOW, SLOWEST, U
 from mdstopo.general.pricing.loaded_members import loaded_at, steps_together
 from mdstopo.general.pricing.priced_tile import SETS, add_points, load_tile, set_share
 from mdstopo.general.pricing.sorted_members import (
+    AT_ZERO,
+    BY_ELONGATION,
+    BY_RATE,
     CLASSES,
     CORNERS,
     COUNT,
@@ -39,6 +44,7 @@ from mdstopo.general.pricing.sorted_members import (
     fill_tangents,
     how_many,
     join_class,
+    modes_of,
     place_in_columns,
     sort_places,
     stay_in,
@@ -91,6 +97,7 @@ BY_ROWS, BY_COLUMNS = range(2)
 FIELDS = (
     "size", "places", "row_node", "row_weight", "row_share", "column_node", "column_weight", "column_share", "between",
     "works", "now", "sums", "row_motion", "box", "part_box", "row_sum", "total", "row_values", "row_mode", "sets",
+    "row_off", "group_at", "group_mode", "group_set", "sure",
 )  # fmt: skip
 
 
@@ -112,7 +119,12 @@ class FewMembers:
     box (TALL, 4): the least and the largest elongation less permanent sets (m), and the least and the largest rate
     (m/s), in each row. part_box (4,): likewise in the part. row_values (BROAD,): what members of a row do. row_mode
     (TALL,): the mode that all members of a row are in, UNSURE where they differ. sets (TALL, 2): the least and the
-    largest permanent set in each row (m).
+    largest permanent set in each row (m). row_off (TALL, 2): how far elongations (m) and rates (m/s) of a row are at
+    most off the line between its ends.
+
+    SHORT columns are a group: group_at (2, PARTS): where its first and its last column are on that line, from 0 to 1.
+    group_mode (TALL, PARTS), group_set (TALL, 2, PARTS): as row_mode and sets, of each group of each row. sure (TALL,):
+    a bit for each group of a row that bounds tell to stay in its mode in the step.
     """
 
     def __init__(self, *_arrays: Any) -> None: ...
@@ -145,6 +157,11 @@ def make_few():
         np.zeros(BROAD),
         np.zeros(TALL, np.int64),
         np.zeros((TALL, 2)),
+        np.zeros((TALL, 2)),
+        np.zeros((2, PARTS)),
+        np.zeros((TALL, PARTS), np.int64),
+        np.zeros((TALL, 2, PARTS)),
+        np.zeros(TALL, np.int64),
     )
 
 
@@ -225,6 +242,12 @@ def _fill_columns(numbers, begin, level, few):
     fill_weights(numbers, begin, size, COLUMN_NODE[level], few.column_node, few.column_weight)
     fill_column_shares(numbers, begin, size, few.column_node, few.column_weight, few.column_share)
     few.between[BY_COLUMNS] = _lebesgue(few.column_share[:, :size].T)
+    for g in range(size // SHORT):
+        for end in range(2):
+            place = 0.0
+            for c in range(COLUMN_NODES):
+                place += few.column_node[c] * few.column_share[c, g * SHORT + end * (SHORT - 1)]
+            few.group_at[end, g] = 0.5 * (1.0 + place)
 
 
 @kernel
@@ -389,29 +412,42 @@ def _begin(tile, s, first, few):
             modes[0, b] = mode_at_start(model, candidates, k, lo + i, s, node)
             sets[0, b] = law_first_set(code, candidates.law[k], node[ELONGATION, 0], modes[0, b])
             fresh[b] = sets[0, b]
+    few.sure[:] = 0
     for a in range(tile.height):
         _note_row(tile, a, first, few)
 
 
 @part
 def _note_row(tile, a, first, few):
-    """Note the mode of the members of row a, and the range of their permanent sets.
+    """Note the modes of the members of row a, and the range of their permanent sets: of each group that is not `sure`
+    to have kept these, and of the row.
 
     tile, first, few: as of `_choose`.
     """
-    modes, sets = tile.lists.modes, tile.lists.sets
-    begin = a * BROAD + first
-    mode = modes[0, begin]
-    low = sets[0, begin]
-    high = low
-    for b in range(begin, begin + few.size[PART_COLUMNS]):
-        low = min(low, sets[0, b])
-        high = max(high, sets[0, b])
-        if modes[0, b] != mode:
-            mode = np.int64(UNSURE)
-    few.row_mode[a] = mode
-    few.sets[a, 0] = low
-    few.sets[a, 1] = high
+    modes, sets, group_mode, group_set = tile.lists.modes, tile.lists.sets, few.group_mode, few.group_set
+    groups = few.size[PART_COLUMNS] // SHORT
+    for g in range(groups):
+        if (few.sure[a] >> g) & 1 == 1:
+            continue
+        begin = a * BROAD + first + g * SHORT
+        mode = modes[0, begin]
+        low = sets[0, begin]
+        high = low
+        for b in range(begin, begin + SHORT):
+            low = min(low, sets[0, b])
+            high = max(high, sets[0, b])
+            if modes[0, b] != mode:
+                mode = np.int64(UNSURE)
+        group_mode[a, g] = mode
+        group_set[a, 0, g] = low
+        group_set[a, 1, g] = high
+    few.row_mode[a] = group_mode[a, 0]
+    few.sets[a] = group_set[a, :, 0]
+    for g in range(1, groups):
+        if group_mode[a, g] != group_mode[a, 0]:
+            few.row_mode[a] = UNSURE
+        few.sets[a, 0] = min(few.sets[a, 0], group_set[a, 0, g])
+        few.sets[a, 1] = max(few.sets[a, 1], group_set[a, 1, g])
 
 
 @kernel
@@ -483,8 +519,12 @@ def _sort_part(tile, s, first, few):
     t = candidates.step_time[s, 0]
     size = few.size[PART_COLUMNS]
     classes[:] = 0
+    sorting.mode[:] = UNSURE
     near = np.int64(0)
     _move_rows(tile.height, few)
+    _bound_rows(tile.height, few)
+    count = _try_modes(tile, first, few)
+    fill_tangents(code, p, model.curves, t, few.part_box, count, sorting.tried, sorting.tangent)
     for a in range(tile.height):
         box = few.box[a]
         mode = few.row_mode[a]
@@ -495,11 +535,40 @@ def _sort_part(tile, s, first, few):
             kind[a * BROAD + first : a * BROAD + first + size] = own
             if own != UNSORTED:
                 continue
-        near = _sort_row(tile, s, a, first, box, few, near)
+        near = _sort_row(tile, s, a, first, count, few, near)
     sort_places(
         model, candidates, k, s, sorting.places, near, np.int64(0), np.bool_(True), tile.lists.modes[0],
         tile.lists.sets[0], sorting,
     )  # fmt: skip
+
+
+@part
+def _bound_rows(height, few):
+    """Write the range that all rows are in, of elongations less permanent sets, and of rates, into `part_box`."""
+    box, rows = few.part_box, few.box
+    box[:] = rows[0]
+    for a in range(1, height):
+        box[LOW] = min(box[LOW], rows[a, LOW])
+        box[HIGH] = max(box[HIGH], rows[a, HIGH])
+        box[SLOWEST] = min(box[SLOWEST], rows[a, SLOWEST])
+        box[FASTEST] = max(box[FASTEST], rows[a, FASTEST])
+
+
+@kernel
+def _try_modes(tile, first, few):
+    """The modes that some members of a part are in, TRIED of them at most: `tried` of the tile's sorting is set.
+
+    tile, first, few: as of `_choose`. Returns how many there are.
+    """
+    modes, tried = tile.lists.modes, tile.sorting.tried
+    count = np.int64(0)
+    for a in range(tile.height):
+        if few.row_mode[a] != UNSURE:
+            count = try_mode(few.row_mode[a], count, tried)
+            continue
+        for b in range(a * BROAD + first, a * BROAD + first + few.size[PART_COLUMNS]):
+            count = try_mode(modes[0, b], count, tried)
+    return count
 
 
 @part
@@ -596,6 +665,7 @@ def _move_rows(height, few):
                 high = max(high, max(one, other))
                 off = _off_line(motion, to, node, one, other, off)
             more = few.between[BY_COLUMNS] * largest(off)
+            few.row_off[a, q] = more
             box[a, LOW if q == 0 else SLOWEST] = low - more
             box[a, HIGH if q == 0 else FASTEST] = high + more
         box[a, LOW] -= few.sets[a, 1]
@@ -603,10 +673,11 @@ def _move_rows(height, few):
 
 
 @kernel
-def _move_members(a, first, few, sets, works):
-    """Elongations less permanent sets, and rates, of all members of a row at the nodes of a step but for the first.
+def _move_members(a, first, g, few, sets, works):
+    """Elongations less permanent sets, and rates, of the members of a group of columns of a row at the nodes of a step
+    but for the first.
 
-    a, first, few: the row, the first column of the part, and a `FewMembers`.
+    a, first, g, few: the row, the first column of the part, the group, and a `FewMembers`.
     sets (2, PLACES): permanent sets, in row 0 (m).
     works (NODES, WORKS, MANY): set.
     """
@@ -614,17 +685,17 @@ def _move_members(a, first, few, sets, works):
     motion, share = motion.reshape(motion.size), share.reshape(share.size)
     many = works.shape[2]
     works = works.reshape(works.size)
-    size = few.size[PART_COLUMNS]
+    begin = g * SHORT
     for m in range(1, NODES):
         for q in range(2):
             own = ((a * NODES + m) * 2 + q) * COLUMN_NODES
             to = (m * WORKS + (ELONGATION if q == 0 else RATE)) * many
-            for b in range(0, size, lanes()):
+            for b in range(0, SHORT, lanes()):
                 value = zero()
                 for c in range(COLUMN_NODES):
-                    value += motion[own + c] * load(share, c * BROAD + b)
+                    value += motion[own + c] * load(share, c * BROAD + begin + b)
                 if q == 0:
-                    value = value - load(sets, a * BROAD + first + b)
+                    value = value - load(sets, a * BROAD + first + begin + b)
                 store(works, to + b, value)
 
 
@@ -644,42 +715,109 @@ def _all_stay(code, p, curves, t, mode, box):
 
 
 @kernel
-def _sort_row(tile, s, a, first, box, few, near):
-    """Sort those members of a row that stay in their modes, and list the others.
+def _sort_row(tile, s, a, first, count, few, near):
+    """Sort the members of a row by what they do in a step: groups of columns that stay in their mode by bounds, the
+    members of others by themselves.
 
     In:
-      tile, first, few: as of `_choose`. s, a: numbers of the step and of the row.
-      box (4,): of a `FewMembers`, elongations less permanent sets.
+      tile, first: as of `_choose`. s, a: numbers of the step and of the row.
+      count: how many modes are tried.
       near: how many members are listed.
     In place:
       tile: of its sorting classes of the members are set, and those listed in `places` are UNSORTED.
+      few: a `FewMembers`, of which `sure` is set for the row.
+
+    Returns how many members are listed then.
+    """
+    classes = tile.sorting.classes
+    sure = _sure_groups(a, count, few, tile.sorting)
+    few.sure[a] = 0
+    for g in range(few.size[PART_COLUMNS] // SHORT):
+        if (sure >> g) & 1 == 1:
+            mode = few.group_mode[a, g]
+            own = join_class(mode, mode, SHORT, classes)
+            if own != UNSORTED:
+                begin = a * BROAD + first + g * SHORT
+                tile.sorting.kind[begin : begin + SHORT] = own
+                few.sure[a] |= 1 << g
+                continue
+        near = _sort_group(tile, s, a, g, first, count, few, near)
+    return near
+
+
+@part
+def _sure_groups(a, count, few, sorting):
+    """A bit for each group of columns of a row whose members are in one mode, and stay in it by bounds.
+
+    Elongations and rates are linear along the row but for what `row_off` tells.
+
+    a, count, few: as of `_sort_row`. sorting: the tile's `Sorting`.
+    """
+    motion, at = few.row_motion, few.group_at
+    found = np.int64(0)
+    for g in range(0, PARTS, lanes()):
+        least_x, most_x = _range_of_groups(motion, at, a, 0, g)
+        least_rate, most_rate = _range_of_groups(motion, at, a, 1, g)
+        least_x = least_x - few.row_off[a, 0] - load(few.group_set[a, 1], g)
+        most_x = most_x + few.row_off[a, 0] - load(few.group_set[a, 0], g)
+        least_rate = least_rate - few.row_off[a, 1]
+        most_rate = most_rate + few.row_off[a, 1]
+        for n in range(count):
+            short = zero() - np.inf
+            for corner in range(CORNERS):
+                own = sorting.tangent[n, corner]
+                x = least_x if own[BY_ELONGATION] > 0.0 else most_x
+                rate = least_rate if own[BY_RATE] > 0.0 else most_rate
+                short = larger(SURE - (own[BY_ELONGATION] * x + own[BY_RATE] * rate + own[AT_ZERO]), short)
+            bits = negative(short)
+            for lane in range(lanes() if bits != 0 else 0):
+                if (bits >> lane) & 1 == 1 and few.group_mode[a, g + lane] == sorting.tried[n]:
+                    found |= 1 << (g + lane)
+    return found
+
+
+@part
+def _range_of_groups(motion, at, a, q, g):
+    """The least and the largest elongation (q = 0) or rate (1) of some groups of columns at the nodes of a step but for
+    the first, on the line between the ends of a row: vectors.
+
+    motion, at: of a `FewMembers`. a, g: the row and the first group.
+    """
+    low = zero() - np.inf
+    high = zero() - np.inf
+    for m in range(1, NODES):
+        begin = motion[a, m, q, 0]
+        change = motion[a, m, q, COLUMN_NODES - 1] - begin
+        for end in range(2):
+            value = change * load(at[end], g) + begin
+            low = larger(zero() - value, low)
+            high = larger(value, high)
+    return zero() - low, high
+
+
+@kernel
+def _sort_group(tile, s, a, g, first, count, few, near):
+    """Sort the members of a group of columns of a row, and list those near a switch.
+
+    tile, s, a, first, count, few, near: as of `_sort_row`. g: the group.
 
     Returns how many members are listed then.
     """
     sorting, modes, sets = tile.sorting, tile.lists.modes, tile.lists.sets
-    kind, classes, tried = sorting.kind, sorting.classes, sorting.tried
-    size = few.size[PART_COLUMNS]
-    begin = a * BROAD + first
-    _move_members(a, first, few, sets, sorting.works)
-    count = np.int64(0)
-    alike = few.row_mode[a] != UNSURE
-    for b in range(begin, begin + (1 if alike else size)):
-        count = try_mode(modes[0, b], count, tried)
-    fill_tangents(
-        tile.candidates.run[tile.k, CODE], tile.candidates.law[tile.k], tile.model.curves,
-        tile.candidates.step_time[s, 0], box, count, tried, sorting.tangent,
-    )  # fmt: skip
-    sorting.mode[:] = UNSURE
-    for b in range(0, size, lanes()):
+    kind, classes, tried, works = sorting.kind, sorting.classes, sorting.tried, sorting.works
+    candidates, k, curves = tile.candidates, tile.k, tile.model.curves
+    begin = a * BROAD + first + g * SHORT
+    _move_members(a, first, g, few, sets, works)
+    for b in range(0, SHORT, lanes()):
         left = (1 << lanes()) - 1
         for n in range(count):
+            if few.group_mode[a, g] != UNSURE and few.group_mode[a, g] != tried[n]:
+                continue
             bits = stay_in(n, b, np.int64(1), sorting) & left
-            for lane in range(lanes() if bits != 0 and not alike else 0):
+            for lane in range(lanes() if bits != 0 else 0):
                 if modes[0, begin + b + lane] != tried[n]:
                     bits &= ~(1 << lane)
-            if bits == 0:
-                continue
-            own = join_class(tried[n], tried[n], how_many(bits), classes)
+            own = join_class(tried[n], tried[n], how_many(bits), classes) if bits != 0 else UNSORTED
             if own == UNSORTED:
                 continue
             left &= ~bits
@@ -687,9 +825,16 @@ def _sort_row(tile, s, a, first, box, few, near):
                 if (bits >> lane) & 1 == 1:
                     kind[begin + b + lane] = own
         for lane in range(lanes() if left != 0 else 0):
-            if (left >> lane) & 1 == 1:
-                kind[begin + b + lane] = UNSORTED
-                sorting.places[near] = begin + b + lane
+            if (left >> lane) & 1 == 0:
+                continue
+            place = begin + b + lane
+            old, new = modes_of(
+                candidates.run[k, CODE], candidates.law[k], curves, NO_REST, candidates.step_time[s], modes[0, place],
+                sorting.mode, works, b + lane, SURE,
+            )  # fmt: skip
+            kind[place] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
+            if old == UNSURE:
+                sorting.places[near] = place
                 near += 1
     return near
 
@@ -874,11 +1019,15 @@ def _end_step(tile, s, first, few):
     for a in range(tile.height):
         if whole and row_class[a] != UNSORTED:
             continue
-        for b in range(a * BROAD + first, a * BROAD + first + few.size[PART_COLUMNS]):
-            if whole:
-                sets[0, b] = fresh[b]
-            else:
-                sets[1, b] = fresh[b]
-                fresh[b] = sets[0, b]
+        for g in range(few.size[PART_COLUMNS] // SHORT):
+            if whole and (few.sure[a] >> g) & 1 == 1:
+                continue
+            begin = a * BROAD + first + g * SHORT
+            for b in range(begin, begin + SHORT):
+                if whole:
+                    sets[0, b] = fresh[b]
+                else:
+                    sets[1, b] = fresh[b]
+                    fresh[b] = sets[0, b]
         if whole:
             _note_row(tile, a, first, few)

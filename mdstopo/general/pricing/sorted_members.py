@@ -206,8 +206,9 @@ def sort_members(model, candidates, k, s, first, size, height, known, begin, kep
             if (left >> lane) & 1 == 1:
                 at = place_in_columns(first, i + lane)
                 old = begin[at] if known else np.int64(UNSURE)
-                old, new = _modes_of(
-                    code, p, model.curves, free[lo + i + lane], candidates.step_time[s], old, mode, works, i + lane
+                old, new = modes_of(
+                    code, p, model.curves, free[lo + i + lane], candidates.step_time[s], old, mode, works, i + lane,
+                    0.0,
                 )  # fmt: skip
                 kind[at] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
 
@@ -262,8 +263,9 @@ def sort_places(model, candidates, k, s, places, count, modes, known, begin, kep
                 if (left >> lane) & 1 == 1:
                     place = places[at + i + lane]
                     old = begin[place] if known else np.int64(UNSURE)
-                    old, new = _modes_of(
-                        code, p, model.curves, free[i + lane], candidates.step_time[s], old, mode, works, i + lane
+                    old, new = modes_of(
+                        code, p, model.curves, free[i + lane], candidates.step_time[s], old, mode, works, i + lane,
+                        0.0,
                     )  # fmt: skip
                     kind[place] = join_class(old, new, 1, classes) if old != UNSURE else UNSORTED
 
@@ -433,7 +435,7 @@ def stay_in(n, i, begin, sorting):
 
 
 @part
-def _modes_of(code, p, curves, rest, time, old, mode, works, i):
+def modes_of(code, p, curves, rest, time, old, mode, works, i, sure):
     """The mode in which a member begins a step, and the one in which it ends it; UNSURE where there are more, or
     where values at nodes do not tell.
 
@@ -442,6 +444,7 @@ def _modes_of(code, p, curves, rest, time, old, mode, works, i):
     old: the mode with which it begins, or UNSURE where it is to be found.
     mode (NODES,): of all members at the nodes, or UNSURE.
     works (NODES, WORKS, MANY), i: what members do at the nodes where that is so, less their sets, and which one it is.
+    sure: margins at nodes that are nearer to zero than this do not tell (m, m/s or a part).
     """
     unsure = np.int64(UNSURE)
     if old == UNSURE:
@@ -462,15 +465,18 @@ def _modes_of(code, p, curves, rest, time, old, mode, works, i):
             x = works[m, ELONGATION, i]
             rate = works[m, RATE, i]
             t = time[0] + NODE[m] * time[1]
-            if law_margin(code, p, x, rate, now, t, curves, rest) >= 0.0:
+            margin = law_margin(code, p, x, rate, now, t, curves, rest)
+            if margin >= sure:
                 continue
+            if margin > -sure:
+                return unsure, unsure
             if law_remembers(code):
                 new = np.int64(law_next(code, p, x, rate, 0.0, now, t, curves, rest))
             else:
                 new = np.int64(law_start(code, p, x, rate, 0.0, t, curves, rest))
             if law_makes_set(code, now, new) and now == old:
                 return old, new  # `switching_together` looks at what is behind
-            if new == now or not law_margin(code, p, x, rate, new, t, curves, rest) >= 0.0:
+            if new == now or not law_margin(code, p, x, rate, new, t, curves, rest) >= sure:
                 return unsure, unsure
         if now != old:
             return unsure, unsure
