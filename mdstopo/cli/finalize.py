@@ -18,6 +18,7 @@ from mdstopo.shown import counted
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
     from mdstopo.finalize.finalize_design import Finalized
+    from mdstopo.store.result_reader import ResultView
 
 _SIGNS = {"limit": "<=", "equals": "=", "at_least": ">="}
 
@@ -107,6 +108,7 @@ def command(
     if done.text:
         replace_file(place, done.text.encode())
     _say(output, done, place)
+    _say_held(output, view, case)
     output.document(_document(done, place))
     for warning in (*_warnings(done), *(each for each in map(_trouble, done.columns) if each)):
         output.notice(f"warning: {warning}")
@@ -122,6 +124,16 @@ def _head(case: "Case", count: int) -> str:
         f"# {count} of the {case.n_design:,} members of {case.name}, sized: {command_line}\n"
         "# Each is a group, and its law and cost are those of its size: alpha is 1.\n"
     )
+
+
+def _say_held(output: Output, view: "ResultView", case: "Case") -> None:
+    """Tell which variables of the result (`view`) are none of the case that is sized anew, and so stay."""
+    from mdstopo.case.text.words import listed
+
+    if held := sorted(set(view.under("design/variables")) - {each.name for each in case.variables}):
+        output.notice(
+            f"{listed(held)}: as in the result; defined names and points are not optimised again with the members kept"
+        )
 
 
 def _say(output: Output, done: "Finalized", place: Path) -> None:

@@ -3,7 +3,7 @@
 import math
 import shlex
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,8 +28,9 @@ from mdstopo.cli.uncertain_numbers import document_of, lines_of
 from mdstopo.shown import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from mdstopo.scene.settled import Settled
     from mdstopo.session.outcome import ChosenSizes, Outcome
 
 _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is neither there nor gone
@@ -98,10 +99,15 @@ def command(
             notify=output.notice,
             command=shlex.join(["mdstopo", *sys.argv[1:]]),
         )
-    _summarise(output, outcome, path)
-    output.document(_document(outcome, path, again))
+    rests = _rests(outcome)
+    _summarise(output, outcome, path, rests)
+    output.document(_document(outcome, path, again, rests))
     for warning in outcome.warnings:
         output.notice(f"warning: {warning}")
+    if len(outcome.states) == 1 and _misses_constraints(outcome):
+        output.notice(
+            "from this start no design was found that keeps the constraints; another start may find one: --starts 8"
+        )
     if outcome.status == "interrupted":
         output.notice(f"interrupted; to go on: {again}")
     status = EXIT[outcome.status]
@@ -142,7 +148,28 @@ def resume_command(
     return shlex.join(words)
 
 
-def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
+def _rests(outcome: "Outcome") -> "dict[str, Settled]":
+    """Where the start has settled with the best design, by load case; empty where the case does not settle."""
+    case = outcome.case
+    if not case.solver.settle:
+        return {}
+    import numpy as np
+
+    from mdstopo.engine import Evaluator
+
+    engine = Evaluator(replace(case, uncertainty=None), in_background=False)  # of an uncertain case the nominal one
+    design = np.concatenate([outcome.alpha, *outcome.variables.values()])
+    found = {each.name: engine.settled(design, each.name) for each in case.load_cases}
+    return {name: rest for name, rest in found.items() if rest is not None}
+
+
+def _misses_constraints(outcome: "Outcome") -> bool:
+    """Whether a run has ended, its best design computed, without a design that keeps the constraints."""
+    computed = all(map(math.isfinite, outcome.constraints.tolist()))
+    return computed and not outcome.keeps_constraints and outcome.status != "interrupted"
+
+
+def _summarise(output: Output, outcome: "Outcome", path: Path, rests: "Mapping[str, Settled]") -> None:
     case = outcome.case
     state = outcome.states[outcome.best_start]
     assert state is not None
@@ -166,6 +193,11 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
     if len(outcome.states) > 1:
         rows += _optima(outcome)
     rows += [[name, sentence] for name, sentence in _material(outcome)]
+    # a design may settle far from where the scene is drawn: what is optimised is then another machine
+    rows += [
+        ["start" if len(rests) == 1 else f"start of {name}", str(rest).removeprefix("the start has ")]
+        for name, rest in rests.items()
+    ]
     rows.append(["integrator", f"{outcome.integrator}: {outcome.integrator_reason}"])
     rows.append(
         [
@@ -281,7 +313,7 @@ def _sizes(chosen: "ChosenSizes") -> list[tuple[str, str]]:
     return lines
 
 
-def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
+def _document(outcome: "Outcome", path: Path, again: str, rests: "Mapping[str, Settled]") -> dict[str, Any]:
     return {
         "command": "run",
         "case": outcome.case.name,
@@ -318,6 +350,11 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         "uncertainty": document_of(outcome.conclusion),
         **({"pricing": asdict(outcome.pricing)} if outcome.pricing is not None else {}),
         **({"sizes": asdict(outcome.sizes)} if outcome.sizes is not None else {}),
+        **(
+            {"settled": {name: {"moved": each.moved, "turned": each.turned} for name, each in rests.items()}}
+            if rests
+            else {}
+        ),
         "warnings": outcome.warnings,
         "path": str(path),
         "resume": again if outcome.status == "interrupted" else None,

@@ -14,6 +14,10 @@ TRY = (
     "try more starts (`--starts 8`), a tighter solver.tolerance where gradients have too few digits, "
     "or a looser optimizer.tolerance where that is good enough"
 )
+JUMPS = (
+    "; objectives jump where the start comes to rest at another place than with a design beside it: look at where it "
+    "has settled, and choose bounds that keep it where it should be"
+)
 #: constraints that are named, and the least share of the Lagrangian's gradient that one has
 NAMED, SHARE = 3, 1e-2
 
@@ -26,7 +30,7 @@ def of_run(case: Case, state: State) -> tuple[str, ...]:
     by = f"; it is held by {', '.join(held)}" if held else ""
     return (
         f"stalled at a KKT residual of {residual(state.kkt)} where optimizer.tolerance asks for "
-        f"{case.optimizer.tolerance:.2g}{by}: {TRY}",
+        f"{case.optimizer.tolerance:.2g}{by}: {TRY}{JUMPS if case.solver.settle else ''}",
     )
 
 

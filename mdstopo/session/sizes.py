@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 CATALOGUE, SEARCH = "catalogue", "catalogue/search"
 #: members with less than this share of the least size above 0 are not kept
 KEPT = 0.5
+#: a choice that is worse than the continuous optimum by more than this share tells how many members had no part in it
+MUCH_WORSE = 0.05
 #: seconds between two lines on how far the choice is
 SAID_EVERY = 10.0
 
@@ -293,16 +295,19 @@ class Sizes:
 
     def _reason(self, progress: SearchProgress) -> str:
         if progress.exhaustive:
-            how = "the best of all choices"
+            how = "the best of all choices for these"
         elif progress.finished:
             how = f"no one of {progress.nodes} nodes has a better relaxation"
         else:
             how = f"the best of {progress.nodes} nodes, after which the search ends"
         size = abs(self._continuous) or 1.0
         worse = (progress.objective - self._continuous) / size
+        others = len(self._groups_at()) - self._kept
+        apart = f"; the other {others} were left at their least size, no choice for them was tried" if others else ""
         return (
             f"sizes of {self._kept} members chosen: {how}, {self._spent + progress.evaluations} evaluations; "
             f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
+            f"{apart if worse > MUCH_WORSE else ''}"
         )
 
 

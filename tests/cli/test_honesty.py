@@ -37,7 +37,9 @@ def test_a_run_that_finds_no_feasible_design_fails_and_names_the_constraint(caps
     assert (status, content["status"]) in ((1, "failed"), (1, "max_iterations"))
     assert content["constraints"][1] > 0.0
     assert run_group(["run", "probe.yaml", "--overwrite"]) == status
-    assert "max displacement of torso relative to vehicle" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "max displacement of torso relative to vehicle" in said.out
+    assert "another start may find one: --starts 8" in said.err
 
 
 @pytest.mark.parametrize("status", [RunStatus.FAILED, RunStatus.CONVERGED, RunStatus.MAX_ITERATIONS])
@@ -67,6 +69,37 @@ def test_constraints_and_objectives_of_the_output_are_of_one_design(capsys):
     assert run_group(["gradient", "probe.yaml", "--alpha", "results/probe.h5", "--json"]) == 0
     values = json.loads(capsys.readouterr().out)["methods"]["adjoint"]["objectives"]
     assert values == pytest.approx(content["objectives"], rel=1e-9)
+
+
+HANGING = """
+format: 1
+gravity: [0, -10]
+time: {end: 0.05}
+define: {k: 400}
+bodies: {load: {mass: 2, inertia: 1, position: [0, 0]}}
+members:
+  springs: {from: {body: ground, at: [0, 1]}, to: {body: load, at: [0, 0]}, law: {type: spring, stiffness: "=k"}}
+design: {initial: 0.5, variables: {k: {of: define.k, lower: 200, upper: 800}}}
+objectives: {G: {response: {velocity: {body: load}}}}
+solver: {settle: true, integrator: runge_kutta}
+optimizer: {max_iterations: 0}
+"""
+
+
+def test_a_run_tells_how_far_the_start_of_its_design_has_settled(capsys):
+    Path("hanging.yaml").write_text(HANGING)
+    assert run_group(["run", "hanging.yaml", "--json"]) == 0
+    settled = json.loads(capsys.readouterr().out)["settled"]
+    assert settled["default"]["moved"] == pytest.approx(2 * 10 / (0.5 * 400), rel=1e-9)  # m g / (alpha k)
+    assert run_group(["run", "hanging.yaml", "--overwrite"]) == 0
+    assert "settled by 0.1 m at most (body load)" in capsys.readouterr().out
+
+
+def test_finalize_tells_which_variables_stay_as_the_result_has_them(capsys):
+    Path("hanging.yaml").write_text(HANGING)
+    assert run_group(["run", "hanging.yaml", "--quiet"]) == 0
+    assert run_group(["finalize", "results/hanging.h5", "--keep", "1"]) == 0
+    assert "k: as in the result; defined names and points are not optimised again" in capsys.readouterr().err
 
 
 def test_differences_of_fixed_steps_are_of_these_steps(capsys):

@@ -49,6 +49,14 @@ def test_a_stalled_run_is_told_with_its_residual_what_holds_it_and_what_to_try(d
         assert advice in told
 
 
+def test_a_stalled_run_that_settles_is_told_where_objectives_jump(done) -> None:
+    settles = replace(done.case, solver=replace(done.case.solver, settle=True))
+    (told,) = shortfall.of_run(settles, stalled(done.states[0]))
+    assert "comes to rest at another place" in told
+    (told,) = shortfall.of_run(done.case, stalled(done.states[0]))
+    assert "comes to rest at another place" not in told
+
+
 def test_the_constraint_that_carries_a_multiplier_is_named_and_others_are_not(done) -> None:
     state = done.states[0]
     groups = state.bundle.group

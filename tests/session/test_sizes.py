@@ -96,6 +96,17 @@ def test_the_sizes_of_a_run_are_the_best_of_all_choices(few, tmp_path, monkeypat
     assert view.array("catalogue/continuous") == outcome.sizes.continuous
 
 
+def test_a_poor_choice_tells_that_members_that_are_not_kept_had_no_part_in_it():
+    outcome = run_session(case_with("[0, 1]"))
+    assert outcome.objectives["G"] > 1.05 * outcome.sizes.continuous
+    assert outcome.sizes.members == 3
+    assert "the best of all choices for these" in outcome.reason
+    assert "the other 5 were left at their least size" in outcome.reason
+    better = run_session(case_with("[0, 0.4, 1]"))
+    assert better.objectives["G"] < 1.05 * better.sizes.continuous
+    assert "were left at their least size" not in better.reason
+
+
 def test_prices_bound_the_choice(tmp_path):
     case = case_with(PRICED)
     outcome = run_session(case, path=tmp_path / "r.h5")
