@@ -87,7 +87,7 @@ reproduce: $(VENV)/.ready-plot
 test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile -m 'not thorough' $(TESTS)
 
-test-all: $(VENV)/.ready-dev
+test-all: $(VENV)/.ready-dev $(VENV)/.ready-docs
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
 
 test-times: $(VENV)/.ready-dev
@@ -101,7 +101,7 @@ $(LOWEST)/.ready: pyproject.toml
 	  extras = project["optional-dependencies"]; \
 	  print(*(each.replace(">=", "==") for each in project["dependencies"] + extras["plot"] + extras["cluster"]), sep="\n")' \
 	  > $(LOWEST)/lowest.txt
-	$(LOWEST)/bin/python -m pip install --quiet --constraint $(LOWEST)/lowest.txt --editable '.[dev]'
+	$(LOWEST)/bin/python -m pip install --quiet --constraint $(LOWEST)/lowest.txt --editable '.[dev,docs]'
 	@touch $@
 
 test-lowest: $(LOWEST)/.ready

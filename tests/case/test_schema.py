@@ -94,7 +94,7 @@ NEW = st.sampled_from([DROP, *VALUES])
 
 
 @given(source=st.sampled_from(SOURCES), new=NEW, choose=st.randoms(use_true_random=False))
-@settings(max_examples=examples(60, 400), deadline=None, derandomize=True)
+@settings(max_examples=examples(30, 400), deadline=None, derandomize=True)
 def test_what_the_schema_refuses_the_reader_refuses(source: Any, new: Any, choose: Any) -> None:
     from mdstopo.case.text.overrides import as_yaml
 

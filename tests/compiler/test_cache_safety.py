@@ -17,7 +17,7 @@ import mdstopo
 from mdstopo.compiler import store
 from mdstopo.compiler.store import Code
 from mdstopo.compiler.trusted import is_private, make_private, read_private
-from tests.sources import tree
+from tests.sources import statements, tree
 
 PACKAGE = Path(mdstopo.__file__).parent
 
@@ -116,7 +116,7 @@ def test_a_kernel_in_a_new_folder_changes_the_key(tmp_path: Path) -> None:
 def imports(path: Path) -> set[str]:
     """Modules that a source file imports, and what it takes from them."""
     found = set()
-    for node in ast.walk(tree(path)):
+    for node in statements(tree(path)):
         if isinstance(node, ast.Import):
             found |= {each.name for each in node.names}
         elif isinstance(node, ast.ImportFrom):

@@ -19,7 +19,7 @@ FETCHED = re.compile(
 
 
 @pytest.mark.skipif(
-    importlib.util.find_spec("mkdocs") is None, reason="mkdocs is not installed: pip install -e '.[docs]'"
+    importlib.util.find_spec("material") is None, reason="mkdocs-material is not installed: pip install -e '.[docs]'"
 )
 def test_the_site_is_built_strictly_and_fetches_nothing(tmp_path: Path) -> None:
     done = subprocess.run(

@@ -55,7 +55,7 @@ def test_a_formula_has_the_value_that_it_has_on_paper(text: str, value: float) -
 
 
 @given(formulas(), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
-@settings(max_examples=examples(60, 300), deadline=None, derandomize=True)
+@settings(max_examples=examples(30, 300), deadline=None, derandomize=True)
 def test_values_are_those_of_a_second_evaluation(text: str, x: float, k: float) -> None:
     formula = parse(text, ("x", "k"))
     found = value_of(formula.root, {"x": x, "k": k})
@@ -66,7 +66,7 @@ def test_values_are_those_of_a_second_evaluation(text: str, x: float, k: float) 
 
 
 @given(formulas())
-@settings(max_examples=examples(60, 200), deadline=None, derandomize=True)
+@settings(max_examples=examples(30, 200), deadline=None, derandomize=True)
 def test_an_expression_is_written_so_that_it_is_read_again(text: str) -> None:
     root = parse(text).root
     assert parse(text_of(root)).root is root
@@ -183,7 +183,7 @@ def test_the_largest_formula_is_computed() -> None:
 
 
 @given(st.text(max_size=60) | st.text(alphabet="xk019.e+-*/^()<>=, if\t" + "".join(FUNCTIONS), max_size=40))
-@settings(max_examples=examples(80, 500), deadline=None, derandomize=True)
+@settings(max_examples=examples(40, 500), deadline=None, derandomize=True)
 def test_any_text_is_a_formula_or_a_located_mistake(text: str) -> None:
     columns = [1]
     try:

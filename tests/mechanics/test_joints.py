@@ -29,7 +29,7 @@ FORCE, MOMENT = 0, 1
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
 seeds = st.integers(0, 2**32 - 1)
-many = settings(max_examples=examples(8, 25), deadline=None, derandomize=True)
+many = settings(max_examples=examples(5, 25), deadline=None, derandomize=True)
 
 
 @kernel

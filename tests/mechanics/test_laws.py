@@ -53,7 +53,7 @@ ELSEWHERE = {
 TIME, REST = 0.0, 1.0
 
 seeds = st.integers(0, 2**32 - 1)
-many = settings(max_examples=examples(20, 60), deadline=None, derandomize=True)
+many = settings(max_examples=examples(12, 60), deadline=None, derandomize=True)
 
 
 # Kernels have no Python wrapper: these are their callers.
@@ -842,7 +842,7 @@ def test_a_curve_is_pchip_inside_and_linear_outside(seed):
         assert f == pytest.approx(pieces(end) + beyond * pieces(end, 1), rel=1e-10, abs=1e-10)
 
 
-@settings(many, max_examples=examples(8, 25))
+@settings(many, max_examples=examples(5, 25))
 @given(seeds)
 def test_the_energy_of_a_curve_is_its_integral_from_no_elongation(seed):
     kernel, _, _, rng = drawn("curve", seed)

@@ -127,7 +127,7 @@ def tries():
     one, and what is told of G."""
     engine = evaluator_of(read(uncertain(DEVIATION, sample=64, validation=256)))
     found = []
-    for seed in range(examples(2, 3)):
+    for seed in range(examples(1, 3)):
         alpha = np.random.default_rng(seed).uniform(0.05, 0.6, engine.case.n_design)
         concluded = conclude(engine, alpha, engine.evaluate(alpha, gradient=False), None)
         names = ("uncertainty/objectives", "uncertainty/validation/objectives")
