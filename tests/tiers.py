@@ -150,7 +150,6 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "general/test_direct.py": ("alone[generalized_alpha",),
     "general/test_error_estimate.py": ("twenty[1e-05",),
     "general/test_esdirk.py": (
-        "a_stop_and_friction",
         "digits[",
         "damper_is_stiff",
         "stability_holds",
@@ -171,7 +170,6 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "general/test_formulas_of_time.py": ("steps_of_collocation", "in_space_a_turn", "integral[wave"),
     "general/test_gauss_in_plane.py": ("tilted", "fourteen", "however_long", "explicit_or_implicit"),
     "general/test_gradients.py": (
-        "through_events_generalized",
         "agree[everything-",
         "computed[everything-generalized_alpha",
     ),
