@@ -96,6 +96,8 @@ class DesignProblem:
             or self.even > 0
             or any(not kind_of(objective.response).is_energy for objective in self._objectives)
         )
+        #: whether U has no peaks, of which others could rise that were not told
+        self.smooth = case.uncertainty is None and all(map(_is_smooth, self._objectives))
         #: no U is below it
         self.objective_bound = lower_bound_of(self._objectives[0]) if one else -np.inf
         aims: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
@@ -355,6 +357,11 @@ def competes(aim: Objective | ResponseRow, sign: float) -> bool:
     if reduction.at_end and kind_of(aim.response).of_members:
         return sign > 0.0  # members compete at the end, too
     return reduction.is_largest if sign > 0.0 else reduction.is_smallest
+
+
+def _is_smooth(objective: Objective) -> bool:
+    """Whether an objective is a smooth function of the design: an integral over time, or the end of one response."""
+    return not REDUCTIONS[objective.over_time].signs and not competes(objective, 1.0)
 
 
 def _linear_rows(rows: list[VolumeRow], space: DesignSpace) -> LinearRows:

@@ -194,6 +194,10 @@ class Bundle:
         seen = (apart <= SEEN_AGAIN**2 * size) & (self.group[:, None] == new.group)
         return self.subset(~seen.any(axis=1))
 
+    def without_far(self, group: int, farthest: float) -> "Bundle":
+        """The rows without those of a group that were seen farther away, in ranges, but for the iterate's own."""
+        return self.subset(self.own | (self.group != group) | (self.distance <= farthest))
+
     def thinned(self) -> "Bundle":
         """The iterate's own rows, and as many others as may be kept: those that carried a multiplier last, and of these
         the newest.

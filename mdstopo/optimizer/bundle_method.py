@@ -48,6 +48,9 @@ RETURN_TRUST, LEAST_RESET_TRUST = 1e-3, 1e-2
 SHRINK, LEAST_TRUST = 0.5, 1e-12
 #: shares of the box above which a step is held back by it, and below which a step leaves it too wide
 LONG, NARROW = 0.5, 0.1
+#: of a smooth objective: lengths of the last step beyond which rows from elsewhere are dropped; and the least and the
+#: most that is left of a step that was rejected
+FARTHEST, LEAST_LEFT, MOST_LEFT = 5.0, 0.1, 0.6
 #: share of the objective below which a promised decrease is none
 NO_DECREASE = 1e-13
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
@@ -64,13 +67,14 @@ BOUND, CARRIED = 1e3, 1e-6
 class BundleMethod:
     """Begin, judge and propose for one problem.
 
-    model: how subproblems are solved, and of which designs; settings: from `presets.settings`. Each method changes the
-    state that it is given; the driver copies it first.
+    model: how subproblems are solved, and of which designs; settings: from `presets.settings`; smooth: as of
+    `problem.Problem`. Each method changes the state that it is given; the driver copies it first.
     """
 
-    def __init__(self, model: RowModel, settings: Settings) -> None:
+    def __init__(self, model: RowModel, settings: Settings, smooth: bool = False) -> None:
         self.model = model
         self.settings = settings
+        self.smooth = smooth
 
     def begin(self, state: GsaoState) -> None:
         """Go on from the iterate, with its rows alone and without curvature."""
@@ -190,10 +194,13 @@ class BundleMethod:
         self._learn_concavity(state, seen, here, moved, there)
         negligible = settings.number("decrease_tolerance") * abs(here[0])
         small = abs(actual) <= negligible and abs(state.predicted) <= negligible
-        state.small = state.small + 1 if small else 0
+        smooth = self.smooth and not state.restoring
+        # the last steps to a smooth optimum are small, but each promises truly what the next one gains
+        goes_on = smooth and ratio > settings.number("poor_ratio")
+        state.small = state.small + 1 if small and not goes_on else 0
         accepted = ratio >= settings.number("accept_ratio")
+        promised = moved.subset(state.bundle.own).levels(groups)
         if accepted:
-            promised = moved.subset(state.bundle.own).levels(groups)
             self._count_stagnation(state, *(float(levels[1:].max(initial=0.0)) for levels in (here, promised, there)))
             state.bundle = moved.without_peaks_of(new).joined(new)
             state.kkt = float("nan")
@@ -203,8 +210,14 @@ class BundleMethod:
         else:
             null_step = _is_null_step(seen, here, new.values(), there)
             state.bundle = state.bundle.with_rejected(seen, new.below())
-            state.trust = NULL_STEP_SHRINK * state.trust if null_step else SHRINK * min(state.trust, size)
+            if smooth:
+                promise = merit(here[0], here[1:], state.penalty) - merit(promised[0], promised[1:], state.penalty)
+                state.trust = _share_to_least(promise, actual) * min(state.trust, size)
+            else:
+                state.trust = NULL_STEP_SHRINK * state.trust if null_step else SHRINK * min(state.trust, size)
         state.bundle = state.bundle.without_repeats().thinned()
+        if smooth:
+            state.bundle = state.bundle.without_far(0, FARTHEST * length)
         if accepted:
             state.take(sample, scaled_violation(sample))
         return accepted
@@ -385,6 +398,13 @@ def _carried_over(concavity: Floats, groups: int) -> Floats:
     if groups == 1:
         return np.array([concavity[1:].max()])
     return np.concatenate([[0.0], np.full(groups - 1, concavity[0])])
+
+
+def _share_to_least(promise: float, actual: float) -> float:
+    """The share of a rejected step after which its merit is least, by the parabola with the slope and the two ends that
+    are known; within limits. promise: of the slopes alone, for the whole step; actual: its decrease."""
+    bend = promise - actual
+    return min(max(0.5 * promise / bend, LEAST_LEFT), MOST_LEFT) if bend > 0.0 else MOST_LEFT
 
 
 def _steepness_of_highest(own: Bundle) -> float:

@@ -107,10 +107,14 @@ class RowModel(Protocol):
 
 
 class DenseModel:
-    """The model of problems whose rows are matrices: everything is computed for all variables."""
+    """The model of problems whose rows are matrices: everything is computed for all variables.
 
-    def __init__(self, space: FeasibleSet) -> None:
+    smooth: as of `problem.Problem`; curvature is then never scaled down as a whole.
+    """
+
+    def __init__(self, space: FeasibleSet, smooth: bool = False) -> None:
         self.space = space
+        self.smooth = smooth
 
     def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
         """The subproblems in a box around x; see `RowModel.around`."""
@@ -119,7 +123,7 @@ class DenseModel:
         space = self.space
         far = np.minimum(reach[1], reach[0] * space.range)
         box = np.maximum(space.lower, x - far), np.minimum(space.upper, x + far)
-        return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range))
+        return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range, not self.smooth))
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual at x; see `RowModel.residual`."""
@@ -276,14 +280,16 @@ def lower_bound(rows: Bundle, trial: Trial, x: Floats, space: FeasibleSet, penal
     return value + float(np.einsum("i->", least))
 
 
-def curvature_of(steps: Floats, changes: Floats, steepest: float, range_: Floats) -> Curvature:
+def curvature_of(
+    steps: Floats, changes: Floats, steepest: float, range_: Floats, scaled_down: bool = True
+) -> Curvature:
     """B in the variables' own units; it is learnt in ranges.
 
     steps, changes (m, N): as `curvature.learnt`, in the variables' own units; steepest: the largest gradient entry of
-    the objective's rows; range_ (N,).
+    the objective's rows; range_ (N,); scaled_down: as of `curvature.learnt`.
     """
     floor = FLOOR * steepest
-    found = learnt(steps / range_, changes * range_, floor)
+    found = learnt(steps / range_, changes * range_, floor, scaled_down)
     return found.scaled(1.0 / range_, 1.0)
 
 

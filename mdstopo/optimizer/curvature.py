@@ -4,7 +4,8 @@ What rows that are lines or norms leave out of the Lagrangian's curvature is lea
 by M. J. D. Powell (1978), of all steps where the variables are few, else of the last ones in compact form (R. H. Byrd,
 J. Nocedal and R. B. Schnabel, 1994). Of few variables B is scaled down before an update where it is far too large along
 the step (S. S. Oren and D. G. Luenberger, 1974): BFGS alone learns of one direction a step that it is as flat. To scale
-at every step would delay the convergence of smooth functions (J. Nocedal and Y. Yuan, 1993).
+at every step would delay the convergence of smooth functions (J. Nocedal and Y. Yuan, 1993); of a problem that is known
+to be smooth B is never scaled down, because what was learnt of steep directions would be forgotten.
 """
 
 from dataclasses import dataclass, replace
@@ -63,10 +64,11 @@ class Curvature:
         return Curvature(self.diagonal[some], self.factor[some], self.weight)
 
 
-def learnt(steps: Floats, changes: Floats, floor: float) -> Curvature:
+def learnt(steps: Floats, changes: Floats, floor: float, scaled_down: bool = True) -> Curvature:
     """B after steps (m, N), the oldest first, and the changes (m, N) of the Lagrangian's gradient over them.
 
-    floor: the least curvature of B before anything is learnt.
+    floor: the least curvature of B before anything is learnt. scaled_down: whether all of B is, where it is far too
+    large along a step.
     """
     n = steps.shape[1]
     sigma = _first(steps, changes, floor)
@@ -78,7 +80,7 @@ def learnt(steps: Floats, changes: Floats, floor: float) -> Curvature:
         sBs = float(s @ Bs)
         if not sBs > 0.0:
             continue
-        if 0.0 < float(s @ y) < FAR_TOO_LARGE * sBs:
+        if scaled_down and 0.0 < float(s @ y) < FAR_TOO_LARGE * sBs:
             B, Bs, sBs = FAR_TOO_LARGE * B, FAR_TOO_LARGE * Bs, FAR_TOO_LARGE * sBs
         damped = _damped(s, y, Bs, sBs)
         B = B - np.outer(Bs, Bs) / sBs + np.outer(damped, damped) / float(s @ damped)

@@ -132,6 +132,8 @@ class Problem(Protocol):
 
     competes (bool, else False): whether the bundle method makes the steps from the start; else the separable
         approximation begins, and the bundle method takes over where that gets no further.
+    smooth (bool, else False): whether every row of U is told at each design, as a smooth function of x: no peaks, of
+        which others may rise that were not told. The bundle method then trusts curvature rather than rows from far off.
     competitors (int or None, else None): how many of the highest rows the separable approximation takes; None: as the
         options `peaks` and `peak_window` say.
     even (int, else 0): how many of the last variables are drawn uniformly at every random start, because no part of

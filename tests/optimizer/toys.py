@@ -81,3 +81,27 @@ def failing(problem, when, status=Status.ZERO_LENGTH, message="belts[3]"):
 
     problem.evaluate = evaluate
     return problem
+
+
+def shaken_block(n, share, seed=0, directions=6, frequencies=20):
+    """The rms of a block on n springs over a band of frequencies of a force: smooth, and bent
+    both ways by the resonances; a share of all springs may be spent."""
+    rng = np.random.default_rng(seed)
+    along = rng.normal(size=(n, directions))
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    force = rng.normal(size=directions)
+    eye = np.eye(directions)
+
+    def functions(x):
+        stiffness = (along.T * x) @ along
+        square, slope = 0.0, np.zeros(n)
+        for omega in np.linspace(0.1, 3.0, frequencies) ** 2:
+            dynamic = stiffness - (omega - 0.1j * np.sqrt(omega)) * eye
+            u = np.linalg.solve(dynamic, force)
+            adjoint = np.linalg.solve(dynamic.T, u.conj())
+            square += float((np.abs(u) ** 2).sum()) / frequencies
+            slope -= 2.0 * np.real((along @ adjoint) * (along @ u)) / frequencies
+        rms = np.sqrt(square)
+        return np.array([rms]), (slope / (2.0 * rms))[None]
+
+    return Toy(functions, np.full(n, share), 0.0, 1.0, volume(n, share * n))

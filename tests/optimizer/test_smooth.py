@@ -1,0 +1,93 @@
+"""Objectives without peaks: the bundle method goes by their curvature rather than by rows from far off."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from mdstopo.case.reader import read_case
+from mdstopo.design_problem import DesignProblem
+from mdstopo.engine import Evaluator
+from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.bundle_method import LEAST_LEFT, MOST_LEFT, _share_to_least
+from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.interface import run
+from mdstopo.optimizer.problem import Sample
+from mdstopo.settings.optimizer_presets import settings
+from mdstopo.status import RunStatus
+from tests.optimizer.toys import shaken_block
+
+
+def ended(problem, smooth):
+    problem.competes, problem.smooth = True, smooth
+    return run(Gsao(problem, settings(max_iterations=150)))
+
+
+@pytest.mark.parametrize(("n", "share", "seed"), [(40, 0.3, 0), (80, 0.3, 1), (80, 0.15, 2)])
+def test_a_smooth_objective_converges_in_fewer_evaluations_than_one_of_which_peaks_may_rise(n, share, seed) -> None:
+    smooth = ended(shaken_block(n, share, seed), smooth=True)
+    careful = ended(shaken_block(n, share, seed), smooth=False)
+    assert smooth.status is RunStatus.CONVERGED
+    assert smooth.evaluations < 0.85 * careful.evaluations
+    assert smooth.best_objective <= careful.best_objective * (1.0 + 1e-8)
+
+
+def test_the_end_of_a_smooth_objective_is_an_optimum_of_another_method_too() -> None:
+    problem = shaken_block(40, 0.3)
+    state = ended(problem, smooth=True)
+
+    def value(x):
+        sample = problem.evaluate(x)
+        return sample.objective, sample.gradients[0]
+
+    row = problem.linear
+    limit = {"type": "ineq", "fun": lambda x: float(row.b[0] - row.A[0] @ x), "jac": lambda x: -row.A[0]}
+    bounds = [(0.0, 1.0)] * len(problem.lower)
+    found = minimize(value, state.best_alpha, jac=True, bounds=bounds, constraints=[limit], method="SLSQP",
+                     options={"ftol": 1e-14, "maxiter": 200})  # fmt: skip
+    assert found.fun >= state.best_objective * (1.0 - 1e-7)
+
+
+@pytest.mark.parametrize(("promise", "actual", "share"), [(1.0, -1.0, 0.25), (2.0, -6.0, 0.125)])
+def test_a_rejected_step_is_shortened_to_where_the_parabola_through_its_ends_is_least(promise, actual, share) -> None:
+    """m(t) = -promise t + (promise - actual) t^2, whose value at 1 is -actual."""
+    t = np.linspace(0.0, 1.0, 801)
+    assert t[np.argmin((promise - actual) * t**2 - promise * t)] == pytest.approx(share)
+    assert _share_to_least(promise, actual) == pytest.approx(share)
+
+
+def test_a_rejected_step_is_shortened_neither_to_nothing_nor_hardly() -> None:
+    assert _share_to_least(1.0, -1e6) == LEAST_LEFT
+    assert _share_to_least(1.0, 0.999) == MOST_LEFT
+    assert _share_to_least(0.0, 0.0) == MOST_LEFT
+
+
+def test_rows_from_far_off_are_dropped_but_for_own_ones_and_those_of_other_groups() -> None:
+    rows, slopes = np.array([3.0, 2.0]), np.eye(2)
+    own = Bundle.of(Sample(3.0, rows, slopes, np.array([0.5]), np.ones((1, 2))), np.arange(2))
+    both = own.moved(np.zeros(2), 4.0).joined(own.moved(np.zeros(2), 1.0)).joined(own)
+    kept = both.without_far(0, 2.0)
+    assert kept.group.tolist() == [1, 0, 0, 1, 0, 0, 1]
+    assert kept.distance.tolist() == [4.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+
+
+SCENE = """
+format: 1
+time: {end: 0.2}
+bodies: {block: {mass: 1, inertia: 1, position: [0, 0], velocity: [1, 0]}}
+points:
+  wall: {body: ground, grid: {line: {from: [-1, 0], to: [1, 0.2], count: 2}}}
+  on_block: {body: block, grid: {line: {from: [0, 0], to: [0.1, 0.1], count: 2}}}
+members: {springs: {from: wall, to: on_block, law: {type: spring, stiffness: 10}}}
+design: {initial: 0.5, lower: 0, upper: 1}
+"""
+WAY, FORCE = "{displacement: {body: block, component: x}}", "{member_force: {group: springs}}"
+
+
+@pytest.mark.parametrize(
+    ("response", "over_time", "smooth"),
+    [(WAY, "rms", True), (WAY, "integral", True), (WAY, "final", True), (WAY, "max", False), (WAY, "max_abs", False),
+     (FORCE, "final", False), (FORCE, "mean", True)],
+)  # fmt: skip
+def test_objectives_are_smooth_where_no_peak_that_was_not_told_can_rise(response, over_time, smooth) -> None:
+    text = f"{SCENE}objectives: {{G: {{response: {response}, over_time: {over_time}}}}}\n"
+    assert DesignProblem(Evaluator(read_case(text))).smooth is smooth
