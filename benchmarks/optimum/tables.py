@@ -9,6 +9,7 @@ from benchmarks.optimum.families import families
 from benchmarks.optimum.problems import Problem, named
 from benchmarks.optimum.race import BUDGET, NEAR, STARTS, best_known, other_solvers_of, ours, within
 from benchmarks.optimum.runs import KEPT, LEAST, REACHED, Run, run
+from benchmarks.optimum.smooth import smooth
 from mdstopo.bench.tables import Table, verdict
 
 #: numbers of iterations after which the last words are judged; the first is that of the table of values
@@ -16,7 +17,7 @@ ITERATIONS = (200, 50, 1000)
 #: evaluations within which a convex problem's optimum is to be reached
 WITHIN = 100
 #: what the tables are called on the command line
-PARTS = ("convex", "dynamic", "race", "families", "applications", "nearby", "bars")
+PARTS = ("convex", "dynamic", "race", "families", "applications", "nearby", "smooth", "bars")
 
 
 def everything(
@@ -40,6 +41,8 @@ def everything(
         yield from applications()
     if "nearby" in parts and not names:
         yield from nearby()
+    if "smooth" in parts and not names:
+        yield from smooth()
     if "bars" in parts and not names:
         from benchmarks.bars import bars
 
