@@ -87,7 +87,8 @@ reproduce: $(VENV)/.ready-plot
 test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile -m 'not thorough' $(TESTS)
 
-test-all: $(VENV)/.ready-dev $(VENV)/.ready-docs
+test-all: $(VENV)/.ready-dev
+	$(MAKE) $(VENV)/.ready-docs
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
 
 test-times: $(VENV)/.ready-dev

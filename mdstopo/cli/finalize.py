@@ -108,7 +108,8 @@ def command(
     if done.text:
         replace_file(place, done.text.encode())
     _say(output, done, place)
-    _say_held(output, view, case)
+    if done.text:
+        _say_held(output, view, case)
     output.document(_document(done, place))
     for warning in (*_warnings(done), *(each for each in map(_trouble, done.columns) if each)):
         output.notice(f"warning: {warning}")
@@ -131,9 +132,8 @@ def _say_held(output: Output, view: "ResultView", case: "Case") -> None:
     from mdstopo.case.text.words import listed
 
     if held := sorted(set(view.under("design/variables")) - {each.name for each in case.variables}):
-        output.notice(
-            f"{listed(held)}: as in the result; defined names and points are not optimised again with the members kept"
-        )
+        keep = f"{listed(held)} keep the values" if len(held) > 1 else f"{held[0]} keeps the value"
+        output.notice(f"{keep} of the result: defined names and points are not optimised again with the members kept")
 
 
 def _say(output: Output, done: "Finalized", place: Path) -> None:

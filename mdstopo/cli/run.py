@@ -105,9 +105,7 @@ def command(
     for warning in outcome.warnings:
         output.notice(f"warning: {warning}")
     if len(outcome.states) == 1 and _misses_constraints(outcome):
-        output.notice(
-            "from this start no design was found that keeps the constraints; another start may find one: --starts 8"
-        )
+        output.notice(_advice(outcome, again))
     if outcome.status == "interrupted":
         output.notice(f"interrupted; to go on: {again}")
     status = EXIT[outcome.status]
@@ -169,6 +167,16 @@ def _misses_constraints(outcome: "Outcome") -> bool:
     return computed and not outcome.keeps_constraints and outcome.status != "interrupted"
 
 
+def _advice(outcome: "Outcome", again: str) -> str:
+    """What may find a design that keeps the constraints; again: the command that goes on."""
+    if outcome.status == "max_iterations":
+        return (
+            f"no design was found that keeps the constraints within {outcome.iterations} iterations; a larger "
+            f"optimizer.max_iterations goes on ({again}), or another start may find one: --starts 8"
+        )
+    return "from this start no design was found that keeps the constraints; another start may find one: --starts 8"
+
+
 def _summarise(output: Output, outcome: "Outcome", path: Path, rests: "Mapping[str, Settled]") -> None:
     case = outcome.case
     state = outcome.states[outcome.best_start]
@@ -194,10 +202,7 @@ def _summarise(output: Output, outcome: "Outcome", path: Path, rests: "Mapping[s
         rows += _optima(outcome)
     rows += [[name, sentence] for name, sentence in _material(outcome)]
     # a design may settle far from where the scene is drawn: what is optimised is then another machine
-    rows += [
-        ["start" if len(rests) == 1 else f"start of {name}", str(rest).removeprefix("the start has ")]
-        for name, rest in rests.items()
-    ]
+    rows += [["start" if len(case.load_cases) == 1 else f"start of {name}", rest.moves] for name, rest in rests.items()]
     rows.append(["integrator", f"{outcome.integrator}: {outcome.integrator_reason}"])
     rows.append(
         [

@@ -194,13 +194,13 @@ class BundleMethod:
         self._learn_concavity(state, seen, here, moved, there)
         negligible = settings.number("decrease_tolerance") * abs(here[0])
         small = abs(actual) <= negligible and abs(state.predicted) <= negligible
-        smooth = self.smooth and not state.restoring
+        smooth = self._is_smooth(state)
         # the last steps to a smooth optimum are small, but each promises truly what the next one gains
         goes_on = smooth and ratio > settings.number("poor_ratio")
         state.small = state.small + 1 if small and not goes_on else 0
         accepted = ratio >= settings.number("accept_ratio")
-        promised = moved.subset(state.bundle.own).levels(groups)
         if accepted:
+            promised = moved.subset(state.bundle.own).levels(groups)
             self._count_stagnation(state, *(float(levels[1:].max(initial=0.0)) for levels in (here, promised, there)))
             state.bundle = moved.without_peaks_of(new).joined(new)
             state.kkt = float("nan")
@@ -209,12 +209,13 @@ class BundleMethod:
                 state.resets = 0
         else:
             null_step = _is_null_step(seen, here, new.values(), there)
-            state.bundle = state.bundle.with_rejected(seen, new.below())
             if smooth:
+                promised = moved.subset(state.bundle.own).levels(groups)
                 promise = merit(here[0], here[1:], state.penalty) - merit(promised[0], promised[1:], state.penalty)
                 state.trust = _share_to_least(promise, actual) * min(state.trust, size)
             else:
                 state.trust = NULL_STEP_SHRINK * state.trust if null_step else SHRINK * min(state.trust, size)
+            state.bundle = state.bundle.with_rejected(seen, new.below())
         state.bundle = state.bundle.without_repeats().thinned()
         if smooth:
             state.bundle = state.bundle.without_far(0, FARTHEST * length)
@@ -231,7 +232,8 @@ class BundleMethod:
             unit = steepest if state.restoring else residual_unit(state, _steepness_of_highest(own), steepest)
             state.kkt = self.model.residual(own, state.alpha, penalty, unit)
         reach = state.trust, self.settings.number("move_limit")
-        around = self.model.around(state.alpha, reach, state.steps, state.changes, max(steepest, 1e-300))
+        learnt = state.steps, state.changes
+        around = self.model.around(state.alpha, reach, *learnt, max(steepest, 1e-300), self._is_smooth(state))
 
         here = own.levels(len(state.penalty) + 1)
         rows = state.bundle.lowered(here, state.concavity)
@@ -276,6 +278,10 @@ class BundleMethod:
         return max(merit(here[0], here[1:], state.penalty) - least, 0.0)
 
     # -- how
+
+    def _is_smooth(self, state: GsaoState) -> bool:
+        """Whether what is lowered now has no peaks; the largest violation, which limits are restored by, may have."""
+        return self.smooth and not state.restoring
 
     def _judge_far_design(self, state: GsaoState, sample: Sample) -> bool:
         """Whether limits are to be restored from the evaluated trial, far from the least violation v at the iterate.

@@ -90,8 +90,20 @@ class RowModel(Protocol):
 
     space: FeasibleSet
 
-    def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
-        """The subproblems at x (N,), in a box of so many ranges and so far; steps, changes: as of `State`."""
+    def around(
+        self,
+        x: Floats,
+        reach: tuple[float, float],
+        steps: Slopes,
+        changes: Slopes,
+        steepest: float,
+        smooth: bool = False,
+    ) -> Around:
+        """The subproblems at x (N,).
+
+        reach: how many ranges the box reaches, and how far at most. steps, changes: as of `State`. steepest: the
+        largest gradient entry of the objective's rows; smooth: whether these have no peaks (`problem.Problem`).
+        """
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual, as the function `residual` has it."""
@@ -107,23 +119,27 @@ class RowModel(Protocol):
 
 
 class DenseModel:
-    """The model of problems whose rows are matrices: everything is computed for all variables.
+    """The model of problems whose rows are matrices: everything is computed for all variables."""
 
-    smooth: as of `problem.Problem`; curvature is then never scaled down as a whole.
-    """
-
-    def __init__(self, space: FeasibleSet, smooth: bool = False) -> None:
+    def __init__(self, space: FeasibleSet) -> None:
         self.space = space
-        self.smooth = smooth
 
-    def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
-        """The subproblems in a box around x; see `RowModel.around`."""
+    def around(
+        self,
+        x: Floats,
+        reach: tuple[float, float],
+        steps: Slopes,
+        changes: Slopes,
+        steepest: float,
+        smooth: bool = False,
+    ) -> Around:
+        """The subproblems in a box around x; reach, steps, changes, steepest, smooth: as of `RowModel`."""
         assert isinstance(steps, np.ndarray)
         assert isinstance(changes, np.ndarray)
         space = self.space
         far = np.minimum(reach[1], reach[0] * space.range)
         box = np.maximum(space.lower, x - far), np.minimum(space.upper, x + far)
-        return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range, not self.smooth))
+        return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range, not smooth))
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual at x; see `RowModel.residual`."""

@@ -73,14 +73,14 @@ class Gsao:
         #: whether rows compete from the start; else the separable model begins
         self.competes = bool(getattr(problem, "competes", False))
         self.objective_bound = float(getattr(problem, "objective_bound", -np.inf))
-        #: whether all rows of U are known at each design, and smooth
+        #: as of `problem.Problem`
         self.smooth = bool(getattr(problem, "smooth", False))
         self.bundle = self._bundle_method(space) if settings.flag("bundle") else None
 
     def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
         """The bundle method for the problem's size; of very many variables only where rows compete from the start."""
         if len(self.lower) < WIDE:
-            return BundleMethod(DenseModel(space, self.smooth), self.settings, self.smooth)
+            return BundleMethod(DenseModel(space), self.settings, self.smooth)
         if not self.competes:
             return None
         return BundleMethod(WideModel(space, self._measures), self.settings, self.smooth)

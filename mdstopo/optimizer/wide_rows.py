@@ -91,8 +91,17 @@ class WideModel:
         self.unit = short if len(short) == n else short[:1]
         self.linear = [(np.ascontiguousarray(row), False) for row in space.linear.A]
 
-    def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
-        """The subproblems in a box around x; see `RowModel.around`."""
+    def around(
+        self,
+        x: Floats,
+        reach: tuple[float, float],
+        steps: Slopes,
+        changes: Slopes,
+        steepest: float,
+        smooth: bool = False,
+    ) -> Around:
+        """The subproblems in a box around x; reach, steps, changes, steepest: as of `RowModel`. smooth: makes no
+        difference here, where all curvature is that of a few steps."""
         s, y = _stack(steps), _stack(changes)
         pairs = [*((row, True) for row in s.rows), *((row, False) for row in y.rows)]
         while pairs:

@@ -21,8 +21,13 @@ class Settled:
     turned: float
     turned_body: str
 
-    def __str__(self) -> str:
+    @property
+    def moves(self) -> str:
+        """How far bodies have moved, in words that follow `the start has`."""
         return (
-            f"the start has settled by {self.moved:.4g} m at most (body {self.moved_body}), "
+            f"settled by {self.moved:.4g} m at most (body {self.moved_body}), "
             f"turned by {self.turned:.4g} rad (body {self.turned_body})"
         )
+
+    def __str__(self) -> str:
+        return f"the start has {self.moves}"

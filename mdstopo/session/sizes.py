@@ -295,7 +295,7 @@ class Sizes:
 
     def _reason(self, progress: SearchProgress) -> str:
         if progress.exhaustive:
-            how = "the best of all choices for these"
+            how = "the best of all choices for the members kept"
         elif progress.finished:
             how = f"no one of {progress.nodes} nodes has a better relaxation"
         else:
@@ -303,7 +303,8 @@ class Sizes:
         size = abs(self._continuous) or 1.0
         worse = (progress.objective - self._continuous) / size
         others = len(self._groups_at()) - self._kept
-        apart = f"; the other {others} were left at their least size, no choice for them was tried" if others else ""
+        left = "other member was left at its" if others == 1 else f"{others} other members were left at their"
+        apart = f"; the {left} least size, of which no choice was tried" if others else ""
         return (
             f"sizes of {self._kept} members chosen: {how}, {self._spent + progress.evaluations} evaluations; "
             f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"

@@ -99,7 +99,9 @@ def test_finalize_tells_which_variables_stay_as_the_result_has_them(capsys):
     Path("hanging.yaml").write_text(HANGING)
     assert run_group(["run", "hanging.yaml", "--quiet"]) == 0
     assert run_group(["finalize", "results/hanging.h5", "--keep", "1"]) == 0
-    assert "k: as in the result; defined names and points are not optimised again" in capsys.readouterr().err
+    assert (
+        "k keeps the value of the result: defined names and points are not optimised again" in capsys.readouterr().err
+    )
 
 
 def test_differences_of_fixed_steps_are_of_these_steps(capsys):

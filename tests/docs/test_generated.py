@@ -8,7 +8,7 @@ from typing import Any
 import click
 import pytest
 
-pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install -e '.[docs]'")
+pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install -e '.[dev]'")
 
 from documentation import array_tables, command_pages, maths
 from documentation.hooks import expanded

@@ -5,9 +5,8 @@ import pytest
 
 from mdstopo.case.scene import candidates as candidates_of_cases
 from mdstopo.general.driver import fewer_states, general_pricing
-from mdstopo.general.driver.fewer_states import CHANGE, ELONGATION, INVERSE, RATE
 from mdstopo.general.model.priced_candidates import FIRST_STAGE, LAST_STAGE, TOGETHER_LEVELS
-from mdstopo.general.pricing.sampled_works import sample_works
+from mdstopo.general.pricing.sampled_works import OF_CHANGES, OF_ELONGATION, OF_INVERSE, OF_RATE, sample_works
 from tests.general.test_candidate_prices import (
     DENSE,
     ENERGY,
@@ -50,8 +49,14 @@ def fewer_of(candidates, states):
 
 @pytest.mark.parametrize(
     ("name", "looks"),
-    [*((name, ENERGY) for name in SCENES), *((name, {}) for name in SCENES if "space" not in name)],
-    ids=lambda each: each if isinstance(each, str) else "energy" if each else "peak",
+    [
+        *((name, ENERGY) for name in SCENES),
+        ("curves", looked("energy", "mean")),
+        *((name, {}) for name in SCENES if "space" not in name),
+    ],
+    ids=lambda each: (
+        each if isinstance(each, str) else f"energy {each['objectives']['G']['over_time']}" if each else "peak"
+    ),
 )
 def test_a_pass_that_sums_over_fewer_states_knows_what_each_candidate_is_worth(name, looks):
     candidates, states = scene_of(name, looks)
@@ -68,17 +73,18 @@ def test_sums_over_fewer_states_are_those_over_all_stages_for_candidates_that_we
     rng = np.random.default_rng(7)
     places = np.stack([rng.integers(0, len(numbers), 64) for numbers in candidates.chosen])
     change = run.change[:, 0]
-    works = np.empty((len(run.when), CHANGE + change.shape[1], places.shape[1]))
+    works = np.empty((len(run.when), OF_CHANGES + change.shape[1], places.shape[1]))
     sample_works(*candidates._packed_scene(states), *candidates._packed(states, candidates.chosen), 0, places, works)
     compared = 0
     for level in range(1, TOGETHER_LEVELS):
         for s in np.flatnonzero(own.few[:, level, 1]):
             few = np.arange(*own.few[s, level]) - len(works)
             stages = np.arange(run.step[s, FIRST_STAGE], run.step[s + (1 << level) - 1, LAST_STAGE])
-            fits = works[own.state[few[0]], INVERSE] <= own.nearest[s, level]
+            assert np.isfinite(own.nearest[s, level])  # there are candidates too short for any few states
+            fits = works[own.state[few[0]], OF_INVERSE] <= own.nearest[s, level]
             compared += fits.sum()
-            for kind in (ELONGATION, RATE):
-                each = works[:, CHANGE:] * works[:, kind, None]
+            for kind in (OF_ELONGATION, OF_RATE):
+                each = works[:, OF_CHANGES:] * works[:, kind, None]
                 all_stages = np.einsum("sc,scm->m", change[stages], each[stages])
                 some = np.einsum("sc,scm->m", own.change[few], each[own.state[few]])
                 size = np.abs(change[stages, :, None] * each[stages]).sum(axis=(0, 1)).max()

@@ -7,8 +7,10 @@ from scipy.optimize import minimize
 from mdstopo.case.reader import read_case
 from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
+from mdstopo.optimizer import competing_rows
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.bundle_method import LEAST_LEFT, MOST_LEFT, _share_to_least
+from mdstopo.optimizer.bundle_method import FARTHEST, LEAST_LEFT, MOST_LEFT, _share_to_least
+from mdstopo.optimizer.curvature import learnt
 from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import Sample
@@ -68,6 +70,42 @@ def test_rows_from_far_off_are_dropped_but_for_own_ones_and_those_of_other_group
     kept = both.without_far(0, 2.0)
     assert kept.group.tolist() == [1, 0, 0, 1, 0, 0, 1]
     assert kept.distance.tolist() == [4.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+
+
+def test_no_row_of_a_smooth_objective_is_kept_that_was_seen_farther_away_than_some_last_steps() -> None:
+    problem = shaken_block(40, 0.3)
+    problem.competes, problem.smooth = True, True
+    optimizer = Gsao(problem, settings(max_iterations=30))
+    state, kept = optimizer.start(), 0
+    while state.running:
+        before = state
+        state = optimizer.step(before)
+        rows = state.bundle.subset((state.bundle.group == 0) & ~state.bundle.own)
+        step = float(np.linalg.norm(before.trial - before.alpha))
+        assert (rows.distance <= FARTHEST * step * (1.0 + 1e-12)).all()
+        kept += len(rows)
+    assert kept > 0
+
+
+def test_the_curvature_of_a_smooth_objective_keeps_its_steep_directions() -> None:
+    """x^2 + 1e-4 y^2, learnt along x and then along y."""
+    steps, changes = np.eye(2), np.diag([2.0, 2e-4])
+    assert learnt(steps, changes, 1e-6, scaled_down=False).dense()[0, 0] == pytest.approx(2.0)
+    assert learnt(steps[::-1], changes[::-1], 1e-6, scaled_down=True).dense()[1, 1] < 0.1
+
+
+def test_curvature_is_scaled_down_as_a_whole_but_for_smooth_objectives(monkeypatch) -> None:
+    for smooth in (True, False):
+        asked = []
+
+        def known(steps, changes, floor, scaled_down, asked=asked):
+            if len(steps):
+                asked.append(scaled_down)
+            return learnt(steps, changes, floor, scaled_down)
+
+        monkeypatch.setattr(competing_rows, "learnt", known)
+        ended(shaken_block(10, 0.3), smooth)
+        assert set(asked) == {not smooth}
 
 
 SCENE = """

@@ -25,6 +25,7 @@ from mdstopo.general.model.priced_candidates import (
     TOGETHER_LEVELS,
     WHOLE,
 )
+from mdstopo.general.pricing.sampled_works import OF_CHANGES, OF_ELONGATION, OF_INVERSE, OF_RATE
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: how far what follows from a few states may be off, relative to the largest of its kind
@@ -37,15 +38,14 @@ LEAST_RANGE = 0.05
 LOOKED_AT, SHORT_FROM, SHORT_TO = 24, 0.02, 0.25
 #: others have to be as long as the shortest of these behind so many of the longest ways of an end
 FURTHER = 1.25
-#: columns of `sampled_works.sample_works` before those of changes
-ELONGATION, RATE, INVERSE, CHANGE = range(4)
 
 
 class FewerStates(NamedTuple):
     """The states of a run over which forces are summed.
 
-    few, nearest: as of `priced_candidates.PricedCandidates`, with numbers among the run's states and, behind these, the
-    K of: state (K,), which of the run's states it is; change (K, D), energy (K,): its virtual change and weight.
+    Behind the states of the run there are K further ones: state (K,) says of which of the run's states each is a copy,
+    change (K, D) and energy (K,) are its virtual change and weight. few, nearest: as of
+    `priced_candidates.PricedCandidates`, with numbers among all these.
     """
 
     few: IndexArray
@@ -81,6 +81,9 @@ def fewer_states(
     virtual changes and weights.
     """
     few, nearest = all_stages(step)
+    none = _Together(np.zeros(0, dtype=np.int64), change[:0], energy[:0])
+    if not len(works):
+        return FewerStates(few, nearest, *none)
     kinds = _Kinds(works, degree)
     known: dict[int, _Together] = {}
     for s in np.flatnonzero(step[:, KIND] == WHOLE).tolist():
@@ -100,17 +103,19 @@ def fewer_states(
                     stages = np.arange(step[s, FIRST_STAGE], step[s + long - 1, LAST_STAGE])
                     nearest[s, level] = kinds.nearest(stages, int(own.state[0]))
                     count += len(own.state)
-    none = _Together(np.zeros(0, dtype=np.int64), change[:0], energy[:0])
     return FewerStates(few, nearest, *(np.concatenate(each) for each in zip(none, *found, strict=True)))
 
 
 def _fewer_of(kinds: "_Kinds", one: _Together, other: _Together) -> _Together | None:
     """The states of two parts of a motion behind each other, as few as will do; the first is in their middle."""
     state, change, energy = (np.concatenate(both) for both in zip(one, other, strict=True))
+    if not len(state):
+        return None
     chosen, share = _chosen(kinds.at(state))
     if not chosen:
         return None
-    middle = int(np.argmin(np.abs(np.array(chosen) - len(one.state))))
+    apart = np.abs(state[chosen] - 0.5 * (state.min() + state.max()))
+    middle = int(np.argmin(apart))
     order = [middle, *(k for k in range(len(chosen)) if k != middle)]
     share = share[:, order]
     return _Together(state[[chosen[k] for k in order]], _shared(share, change), _shared(share, energy))
@@ -123,13 +128,13 @@ class _Kinds:
     """
 
     def __init__(self, works: FloatArray, degree: int) -> None:
-        works = works[:, :, _looked_at(works[:, INVERSE])]
+        works = works[:, :, _looked_at(works[:, OF_INVERSE])]
         largest = np.abs(works).max(axis=(0, 2), initial=np.finfo(float).tiny, keepdims=True)
         scaled = works / largest
-        self._elongation, self._rate, self._along = scaled[:, ELONGATION], scaled[:, RATE], scaled[:, CHANGE:]
-        axes = 2 if works.shape[1] == CHANGE + 3 else 3
-        self._length = 1.0 / works[:, INVERSE]
-        self._apart = works[:, CHANGE : CHANGE + axes] * self._length[:, None]
+        self._elongation, self._rate, self._along = scaled[:, OF_ELONGATION], scaled[:, OF_RATE], scaled[:, OF_CHANGES:]
+        axes = 2 if works.shape[1] == OF_CHANGES + 3 else 3
+        self._length = 1.0 / works[:, OF_INVERSE]
+        self._apart = works[:, OF_CHANGES : OF_CHANGES + axes] * self._length[:, None]
         self._degree = degree
 
     def at(self, states: IndexArray) -> FloatArray:

@@ -9,7 +9,7 @@ from mdstopo.case.laws import Law
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.compiler.threads import allowed
 from mdstopo.general.design.followed_member import AT_NODES, degree_of
-from mdstopo.general.driver.fewer_states import CHANGE, FewerStates, all_stages, fewer_states
+from mdstopo.general.driver.fewer_states import FewerStates, all_stages, fewer_states
 from mdstopo.general.driver.row_gradients import sign_of, wanted_rows
 from mdstopo.general.model.general_model import CODE, GROUP, PAIR, ROW, GeneralModel, pack_general
 from mdstopo.general.model.priced_candidates import (
@@ -29,7 +29,7 @@ from mdstopo.general.model.priced_candidates import (
 )
 from mdstopo.general.pricing import candidate_prices as kernels
 from mdstopo.general.pricing.pricing_states import OF_A_ROW, keep_states, states_of_sum
-from mdstopo.general.pricing.sampled_works import sample_works
+from mdstopo.general.pricing.sampled_works import OF_CHANGES, sample_works
 from mdstopo.general.responses.extremes import COLUMNS, FRACTION, RATE, STEP
 from mdstopo.general.scene.compile_general import GeneralScene
 from mdstopo.general.scene.dimension import dimension_of, in_frame
@@ -249,7 +249,7 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         found: list[FewerStates | None] = []
         for k, run in enumerate(runs):
             change = run.change[:, 0]
-            works = np.empty((len(run.when), CHANGE + change.shape[1], TELLING))
+            works = np.empty((len(run.when), OF_CHANGES + change.shape[1], TELLING))
             degree = sample_works(*scene, *packed, k, places, works) if len(run.step) else 0
             found.append(fewer_states(run.step, works, degree, change, run.energy) if degree else None)
         return found if any(own is not None and len(own.state) for own in found) else []

@@ -19,7 +19,7 @@ NONE, FOLLOWED = range(2)
 #: columns of `PricedCandidates.step`, and what a step may be
 FIRST_STAGE, LAST_STAGE, FIRST_NODE, KIND, MOVES = range(5)
 WHOLE, PART, POINT = range(3)
-#: how many steps behind each other may have states together: 1, 2, 4 and so on, so many of these; columns of
+#: how many levels there are, of which level n has states for 2^n steps behind each other; columns of
 #: `PricedCandidates.few`
 TOGETHER_LEVELS = 5
 FIRST_FEW, BEHIND_FEW = range(2)

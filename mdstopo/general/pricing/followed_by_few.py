@@ -474,7 +474,7 @@ def _all_in_mode(tile, s, few):
 
 @kernel
 def _join_all(tile, mode, first, few):
-    """Put all members of a part into the class of those that stay in a mode.
+    """Put all members of a part into the class of those that stay in a mode, whose number is returned.
 
     tile, first, few: as of `_choose`; the tile's sorting is filled. mode: the mode.
     """
@@ -485,6 +485,7 @@ def _join_all(tile, mode, first, few):
     row_class[:] = own
     for a in range(tile.height):
         kind[a * BROAD + first : a * BROAD + first + size] = own
+    return own
 
 
 @kernel
@@ -497,11 +498,14 @@ def _price_together(tile, begin, behind, first, few):
     """
     if begin == behind:
         return 0.0
-    _join_all(tile, few.row_mode[0], first, few)
-    have_prices, done = _price_staying(tile, begin, behind, first, np.int64(0), few)
-    if not have_prices:
-        for s in range(begin, behind):
-            done += _price_classes(tile, s, first, few)
+    own = _join_all(tile, few.row_mode[0], first, few)
+    done = 0.0
+    if behind - begin > 1:
+        have_prices, done = _price_staying(tile, begin, behind, first, own, few)
+        if have_prices:
+            return done
+    for s in range(begin, behind):
+        done += _price_classes(tile, s, first, few)
     return done
 
 

@@ -102,8 +102,9 @@ def steps_together(model, candidates, s, count, at, members, works):
         behind = candidates.few[s, level, BEHIND_FEW]
         if 1 << level <= count and behind > first:
             member_works(model, at, members, candidates.pose[first, 0], candidates.change[first, 0], works)
-            _, most = range_of(works[INVERSE], members)
-            if most <= candidates.nearest[s, level]:
+            least, most = range_of(works[INVERSE], members)
+            # the inverse length of a member whose ends meet, the shortest there is, is written as 0
+            if least > 0.0 and most <= candidates.nearest[s, level]:
                 return 1 << level, first, behind
         level -= 1
     return np.int64(1), candidates.few[s, 0, FIRST_FEW], candidates.few[s, 0, BEHIND_FEW]

@@ -18,6 +18,9 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 )
 from mdstopo.mechanics.laws.law_table import law_degree
 
+#: columns of what `sample_works` writes; from the last one on there is one for each component of a change of the pose
+OF_ELONGATION, OF_RATE, OF_INVERSE, OF_CHANGES = range(4)
+
 
 @entry
 def sample_works(ints, floats, candidate_ints, candidate_floats, k, places, out):
@@ -42,8 +45,8 @@ def sample_works(ints, floats, candidate_ints, candidate_floats, k, places, out)
     for s in range(out.shape[0]):
         for c in range(freedoms(model)):
             member_works(model, np.int64(0), count, candidates.pose[run[FIRST_STATE] + s, 0], along[c], works)
-            out[s, 3 + c] = works[ALONG, :count]
-        out[s, 0] = works[ELONGATION, :count]
-        out[s, 1] = works[RATE, :count]
-        out[s, 2] = works[INVERSE, :count]
+            out[s, OF_CHANGES + c] = works[ALONG, :count]
+        out[s, OF_ELONGATION] = works[ELONGATION, :count]
+        out[s, OF_RATE] = works[RATE, :count]
+        out[s, OF_INVERSE] = works[INVERSE, :count]
     return law_degree(run[CODE]) if is_quick(run[CODE], candidates.law[k], model.curves) else 0
