@@ -7,13 +7,12 @@ driven, with 162 springs beside them.
 import json
 from collections.abc import Iterator
 
-import numpy as np
-
 from benchmarks.optimum.motions import Document
 from mdstopo.bench.tables import Table
 from mdstopo.case.reader import read_case
 from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.start_families import random_feasible
 from mdstopo.optimizer.state import State
 from mdstopo.settings.optimizer_presets import settings
 
@@ -106,7 +105,7 @@ def smooth() -> Iterator[Table]:
             for by_curvature in (True, False):
                 problem.smooth = by_curvature
                 optimizer = Gsao(problem, settings(max_iterations=MOST - 1))
-                state: State = optimizer.start(_first(problem.lower, problem.upper, start))
+                state: State = optimizer.start(random_feasible(problem, 0, start) if start else None)
                 while state.running:
                     state = optimizer.step(state)
                 word = state.status.value.replace("_", " ")
@@ -116,12 +115,5 @@ def smooth() -> Iterator[Table]:
         "An rms over time, by curvature, and as if it had peaks",
         ("problem", "start", "found", "evaluations", "last word", "as peaks", "evaluations", "last word"),
         rows,
-        (f"At most {MOST} evaluations each. Random: each variable the square of a number that is drawn uniformly.",),
+        (f"At most {MOST} evaluations each. Random: of `random_feasible`, with few thick members.",),
     )
-
-
-def _first(lower: np.ndarray, upper: np.ndarray, start: int) -> np.ndarray | None:
-    """The first design of a start (N,); None: the stated one."""
-    if start == 0:
-        return None
-    return np.asarray(lower + (upper - lower) * np.random.default_rng(start).random(len(lower)) ** 2)

@@ -99,9 +99,9 @@ def command(
             notify=output.notice,
             command=shlex.join(["mdstopo", *sys.argv[1:]]),
         )
-    rests = _rests(outcome)
-    _summarise(output, outcome, path, rests)
-    output.document(_document(outcome, path, again, rests))
+    settled = _settled(outcome)
+    _summarise(output, outcome, path, settled)
+    output.document(_document(outcome, path, again, settled))
     for warning in outcome.warnings:
         output.notice(f"warning: {warning}")
     if len(outcome.states) == 1 and _misses_constraints(outcome):
@@ -146,7 +146,7 @@ def resume_command(
     return shlex.join(words)
 
 
-def _rests(outcome: "Outcome") -> "dict[str, Settled]":
+def _settled(outcome: "Outcome") -> "dict[str, Settled]":
     """Where the start has settled with the best design, by load case; empty where the case does not settle."""
     case = outcome.case
     if not case.solver.settle:
@@ -177,7 +177,7 @@ def _advice(outcome: "Outcome", again: str) -> str:
     return "from this start no design was found that keeps the constraints; another start may find one: --starts 8"
 
 
-def _summarise(output: Output, outcome: "Outcome", path: Path, rests: "Mapping[str, Settled]") -> None:
+def _summarise(output: Output, outcome: "Outcome", path: Path, settled: "Mapping[str, Settled]") -> None:
     case = outcome.case
     state = outcome.states[outcome.best_start]
     assert state is not None
@@ -202,7 +202,8 @@ def _summarise(output: Output, outcome: "Outcome", path: Path, rests: "Mapping[s
         rows += _optima(outcome)
     rows += [[name, sentence] for name, sentence in _material(outcome)]
     # a design may settle far from where the scene is drawn: what is optimised is then another machine
-    rows += [["start" if len(case.load_cases) == 1 else f"start of {name}", rest.moves] for name, rest in rests.items()]
+    several = len(case.load_cases) > 1
+    rows += [[f"start of {name}" if several else "start", each.moves] for name, each in settled.items()]
     rows.append(["integrator", f"{outcome.integrator}: {outcome.integrator_reason}"])
     rows.append(
         [
@@ -318,7 +319,7 @@ def _sizes(chosen: "ChosenSizes") -> list[tuple[str, str]]:
     return lines
 
 
-def _document(outcome: "Outcome", path: Path, again: str, rests: "Mapping[str, Settled]") -> dict[str, Any]:
+def _document(outcome: "Outcome", path: Path, again: str, settled: "Mapping[str, Settled]") -> dict[str, Any]:
     return {
         "command": "run",
         "case": outcome.case.name,
@@ -356,8 +357,8 @@ def _document(outcome: "Outcome", path: Path, again: str, rests: "Mapping[str, S
         **({"pricing": asdict(outcome.pricing)} if outcome.pricing is not None else {}),
         **({"sizes": asdict(outcome.sizes)} if outcome.sizes is not None else {}),
         **(
-            {"settled": {name: {"moved": each.moved, "turned": each.turned} for name, each in rests.items()}}
-            if rests
+            {"settled": {name: {"moved": each.moved, "turned": each.turned} for name, each in settled.items()}}
+            if settled
             else {}
         ),
         "warnings": outcome.warnings,

@@ -16,6 +16,7 @@ from mdstopo.optimizer.competing_rows import (
     STEER,
     Around,
     RowModel,
+    SecantPairs,
     Trial,
     lower_bound,
 )
@@ -185,7 +186,8 @@ class BundleMethod:
         new = self._bundle(sample, state.restoring)
         groups = len(state.penalty) + 1
         here, there = state.bundle.subset(state.bundle.own).levels(groups), new.levels(groups)
-        actual = merit(here[0], here[1:], state.penalty) - merit(there[0], there[1:], state.penalty)
+        now = merit(here[0], here[1:], state.penalty)
+        actual = now - merit(there[0], there[1:], state.penalty)
         ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
         d = state.trial - state.alpha
         self._learn_curvature(state, new, d)
@@ -211,7 +213,7 @@ class BundleMethod:
             null_step = _is_null_step(seen, here, new.values(), there)
             if smooth:
                 promised = moved.subset(state.bundle.own).levels(groups)
-                promise = merit(here[0], here[1:], state.penalty) - merit(promised[0], promised[1:], state.penalty)
+                promise = now - merit(promised[0], promised[1:], state.penalty)
                 state.trust = _share_to_least(promise, actual) * min(state.trust, size)
             else:
                 state.trust = NULL_STEP_SHRINK * state.trust if null_step else SHRINK * min(state.trust, size)
@@ -232,8 +234,8 @@ class BundleMethod:
             unit = steepest if state.restoring else residual_unit(state, _steepness_of_highest(own), steepest)
             state.kkt = self.model.residual(own, state.alpha, penalty, unit)
         reach = state.trust, self.settings.number("move_limit")
-        learnt = state.steps, state.changes
-        around = self.model.around(state.alpha, reach, *learnt, max(steepest, 1e-300), self._is_smooth(state))
+        pairs = SecantPairs(state.steps, state.changes, self._is_smooth(state))
+        around = self.model.around(state.alpha, reach, pairs, max(steepest, 1e-300))
 
         here = own.levels(len(state.penalty) + 1)
         rows = state.bundle.lowered(here, state.concavity)
@@ -270,7 +272,8 @@ class BundleMethod:
         here = state.bundle.subset(state.bundle.own).levels(len(state.penalty) + 1)
         rows = state.bundle.lowered(here, state.concavity)
         added = UNIQUE * self.settings.tolerance * abs(state.objective)
-        around = self.model.around(state.alpha, (np.inf, np.inf), state.steps[:0], state.changes[:0], 0.0)
+        no_pairs = SecantPairs(state.steps[:0], state.changes[:0])
+        around = self.model.around(state.alpha, (np.inf, np.inf), no_pairs, 0.0)
         trial = around.flat(2.0 * added / len(state.alpha)).solve(rows, state.penalty)
         if not trial.solved:
             return float("inf")

@@ -14,7 +14,7 @@ optimality conditions say that nothing near keeps them.
 """
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -66,6 +66,15 @@ class FeasibleSet:
     range: Floats
 
 
+class SecantPairs(NamedTuple):
+    """What curvature is learnt from: steps (m, N), the oldest first, and changes (m, N) of the Lagrangian's gradient
+    over them; smooth: whether the objective has no peaks (`problem.Problem`)."""
+
+    steps: Slopes
+    changes: Slopes
+    smooth: bool = False
+
+
 class Around(Protocol):
     """The subproblems in a box around one iterate."""
 
@@ -90,20 +99,9 @@ class RowModel(Protocol):
 
     space: FeasibleSet
 
-    def around(
-        self,
-        x: Floats,
-        reach: tuple[float, float],
-        steps: Slopes,
-        changes: Slopes,
-        steepest: float,
-        smooth: bool = False,
-    ) -> Around:
-        """The subproblems at x (N,).
-
-        reach: how many ranges the box reaches, and how far at most. steps, changes: as of `State`. steepest: the
-        largest gradient entry of the objective's rows; smooth: whether these have no peaks (`problem.Problem`).
-        """
+    def around(self, x: Floats, reach: tuple[float, float], pairs: SecantPairs, steepest: float) -> Around:
+        """The subproblems at x (N,), in a box of so many ranges and so far; steepest: the largest gradient entry of the
+        objective's rows."""
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual, as the function `residual` has it."""
@@ -124,22 +122,12 @@ class DenseModel:
     def __init__(self, space: FeasibleSet) -> None:
         self.space = space
 
-    def around(
-        self,
-        x: Floats,
-        reach: tuple[float, float],
-        steps: Slopes,
-        changes: Slopes,
-        steepest: float,
-        smooth: bool = False,
-    ) -> Around:
-        """The subproblems in a box around x; reach, steps, changes, steepest, smooth: as of `RowModel`."""
-        assert isinstance(steps, np.ndarray)
-        assert isinstance(changes, np.ndarray)
+    def around(self, x: Floats, reach: tuple[float, float], pairs: SecantPairs, steepest: float) -> Around:
+        """The subproblems in a box around x; see `RowModel.around`."""
         space = self.space
         far = np.minimum(reach[1], reach[0] * space.range)
         box = np.maximum(space.lower, x - far), np.minimum(space.upper, x + far)
-        return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range, not smooth))
+        return _DenseAround(x, space, box, curvature_of(pairs, steepest, space.range))
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual at x; see `RowModel.residual`."""
@@ -296,16 +284,15 @@ def lower_bound(rows: Bundle, trial: Trial, x: Floats, space: FeasibleSet, penal
     return value + float(np.einsum("i->", least))
 
 
-def curvature_of(
-    steps: Floats, changes: Floats, steepest: float, range_: Floats, scaled_down: bool = True
-) -> Curvature:
+def curvature_of(pairs: SecantPairs, steepest: float, range_: Floats) -> Curvature:
     """B in the variables' own units; it is learnt in ranges.
 
-    steps, changes (m, N): as `curvature.learnt`, in the variables' own units; steepest: the largest gradient entry of
-    the objective's rows; range_ (N,); scaled_down: as of `curvature.learnt`.
+    pairs: in the variables' own units; steepest: the largest gradient entry of the objective's rows; range_ (N,).
     """
-    floor = FLOOR * steepest
-    found = learnt(steps / range_, changes * range_, floor, scaled_down)
+    steps, changes = pairs.steps, pairs.changes
+    assert isinstance(steps, np.ndarray)
+    assert isinstance(changes, np.ndarray)
+    found = learnt(steps / range_, changes * range_, FLOOR * steepest, scaled_down=not pairs.smooth)
     return found.scaled(1.0 / range_, 1.0)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.competing_rows import FLOOR, MATCH_COSINE, Around, FeasibleSet, Trial
+from mdstopo.optimizer.competing_rows import FLOOR, MATCH_COSINE, Around, FeasibleSet, SecantPairs, Trial
 from mdstopo.optimizer.nearest_feasible import ROUNDING, repair
 from mdstopo.optimizer.problem import Floats, Ints, largest_of_groups
 from mdstopo.optimizer.stack import Slopes, Stack, joined
@@ -91,28 +91,19 @@ class WideModel:
         self.unit = short if len(short) == n else short[:1]
         self.linear = [(np.ascontiguousarray(row), False) for row in space.linear.A]
 
-    def around(
-        self,
-        x: Floats,
-        reach: tuple[float, float],
-        steps: Slopes,
-        changes: Slopes,
-        steepest: float,
-        smooth: bool = False,
-    ) -> Around:
-        """The subproblems in a box around x; reach, steps, changes, steepest: as of `RowModel`. smooth: makes no
-        difference here, where all curvature is that of a few steps."""
-        s, y = _stack(steps), _stack(changes)
-        pairs = [*((row, True) for row in s.rows), *((row, False) for row in y.rows)]
-        while pairs:
-            half = len(pairs) // 2
-            places = self.pool.places(pairs, self.unit)
+    def around(self, x: Floats, reach: tuple[float, float], pairs: SecantPairs, steepest: float) -> Around:
+        """The subproblems in a box around x; see `RowModel.around`. Curvature is never scaled down as a whole."""
+        s, y = _stack(pairs.steps), _stack(pairs.changes)
+        vectors = [*((row, True) for row in s.rows), *((row, False) for row in y.rows)]
+        while vectors:
+            half = len(vectors) // 2
+            places = self.pool.places(vectors, self.unit)
             _, products = self._products(places)
             sigma = known_curvature(products, half, FLOOR * steepest)
             M = compact(products, half, sigma)
             if M is not None:
-                return _WideAround(self, x, reach, sigma, pairs, products, M, scaled=True)
-            pairs = pairs[1:half] + pairs[half + 1 :]  # without the oldest
+                return _WideAround(self, x, reach, sigma, vectors, products, M, scaled=True)
+            vectors = vectors[1:half] + vectors[half + 1 :]  # without the oldest
         return _WideAround(self, x, reach, FLOOR * steepest, [], NOTHING, NOTHING, scaled=True)
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:

@@ -30,12 +30,12 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: how far what follows from a few states may be off, relative to the largest of its kind
 EXACT = 5e-15
-#: elongations are looked at relative to how much they change in the steps, and to this part of the largest one at
+#: elongations are taken relative to how much they change in the steps, and to this part of the largest one at
 #: least: of smaller changes rounding is left
 LEAST_RANGE = 0.05
-#: how many candidates are looked at, half of them short: from this part of all lengths on, which leaves out those whose
+#: how many candidates are sampled, half of them short: from this part of all lengths on, which leaves out those whose
 #: ends meet, to another one
-LOOKED_AT, SHORT_FROM, SHORT_TO = 24, 0.02, 0.25
+SAMPLED, SHORT_FROM, SHORT_TO = 24, 0.02, 0.25
 #: others have to be as long as the shortest of these behind so many of the longest ways of an end
 FURTHER = 1.25
 
@@ -55,7 +55,7 @@ class FewerStates(NamedTuple):
     energy: FloatArray
 
 
-class _Together(NamedTuple):
+class _SummedStates(NamedTuple):
     """States over which some steps are summed: their numbers, virtual changes and weights."""
 
     state: IndexArray
@@ -81,54 +81,54 @@ def fewer_states(
     virtual changes and weights.
     """
     few, nearest = all_stages(step)
-    none = _Together(np.zeros(0, dtype=np.int64), change[:0], energy[:0])
+    none = _SummedStates(np.zeros(0, dtype=np.int64), change[:0], energy[:0])
     if not len(works):
         return FewerStates(few, nearest, *none)
-    kinds = _Kinds(works, degree)
-    known: dict[int, _Together] = {}
+    sampled = _SampledWorks(works, degree)
+    known: dict[int, _SummedStates] = {}
     for s in np.flatnonzero(step[:, KIND] == WHOLE).tolist():
         stages = np.arange(*step[s, [FIRST_STAGE, LAST_STAGE]])
-        known[s] = _Together(stages, change[stages], energy[stages])
-    found: list[_Together] = []
+        known[s] = _SummedStates(stages, change[stages], energy[stages])
+    found: list[_SummedStates] = []
     count = len(works)
     for level in range(1, TOGETHER_LEVELS):
         long, half, before, known = 1 << level, 1 << (level - 1), known, {}
         for s in before:
             if s % long == 0 and s + half in before:
-                own = _fewer_of(kinds, before[s], before[s + half])
+                own = _fewer_of(sampled, before[s], before[s + half])
                 if own is not None:
                     known[s] = own
                     found.append(own)
                     few[s, level] = count, count + len(own.state)
                     stages = np.arange(step[s, FIRST_STAGE], step[s + long - 1, LAST_STAGE])
-                    nearest[s, level] = kinds.nearest(stages, int(own.state[0]))
+                    nearest[s, level] = sampled.nearest(stages, int(own.state[0]))
                     count += len(own.state)
     return FewerStates(few, nearest, *(np.concatenate(each) for each in zip(none, *found, strict=True)))
 
 
-def _fewer_of(kinds: "_Kinds", one: _Together, other: _Together) -> _Together | None:
+def _fewer_of(sampled: "_SampledWorks", one: _SummedStates, other: _SummedStates) -> _SummedStates | None:
     """The states of two parts of a motion behind each other, as few as will do; the first is in their middle."""
     state, change, energy = (np.concatenate(both) for both in zip(one, other, strict=True))
     if not len(state):
         return None
-    chosen, share = _chosen(kinds.at(state))
+    chosen, share = _chosen(sampled.at(state))
     if not chosen:
         return None
     apart = np.abs(state[chosen] - 0.5 * (state.min() + state.max()))
     middle = int(np.argmin(apart))
     order = [middle, *(k for k in range(len(chosen)) if k != middle)]
     share = share[:, order]
-    return _Together(state[[chosen[k] for k in order]], _shared(share, change), _shared(share, energy))
+    return _SummedStates(state[[chosen[k] for k in order]], _shared(share, change), _shared(share, energy))
 
 
-class _Kinds:
+class _SampledWorks:
     """What some candidates do at the states of a run, of which forces and energies are made.
 
     works, degree: as of `fewer_states`.
     """
 
     def __init__(self, works: FloatArray, degree: int) -> None:
-        works = works[:, :, _looked_at(works[:, OF_INVERSE])]
+        works = works[:, :, _sampled(works[:, OF_INVERSE])]
         largest = np.abs(works).max(axis=(0, 2), initial=np.finfo(float).tiny, keepdims=True)
         scaled = works / largest
         self._elongation, self._rate, self._along = scaled[:, OF_ELONGATION], scaled[:, OF_RATE], scaled[:, OF_CHANGES:]
@@ -155,12 +155,12 @@ class _Kinds:
         return float(1.0 / (FURTHER * way + self._length[states].min(initial=np.inf)))
 
 
-def _looked_at(inverse: FloatArray) -> IndexArray:
-    """Numbers of the candidates that are looked at; inverse (T, M): inverse lengths (1/m) at states, 0 where none."""
+def _sampled(inverse: FloatArray) -> IndexArray:
+    """Numbers of the candidates that are sampled; inverse (T, M): inverse lengths (1/m) at states, 0 where none."""
     order = np.argsort(-np.where(inverse > 0.0, inverse, np.inf).max(axis=0), kind="stable")
     shares = (
-        np.linspace(SHORT_FROM, SHORT_TO, LOOKED_AT // 2, endpoint=False),
-        np.linspace(SHORT_TO, 1.0, LOOKED_AT // 2),
+        np.linspace(SHORT_FROM, SHORT_TO, SAMPLED // 2, endpoint=False),
+        np.linspace(SHORT_TO, 1.0, SAMPLED // 2),
     )
     chosen = order[np.unique((np.concatenate(shares) * (len(order) - 1)).astype(np.int64))]
     found: IndexArray = chosen[(inverse[:, chosen] > 0.0).all(axis=0)]

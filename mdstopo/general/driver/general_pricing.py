@@ -50,8 +50,8 @@ if TYPE_CHECKING:
 #: by how much of the simulated time it is before the end of a step that decides in which mode a candidate is there: a
 #: built one switches there at most by rounding earlier
 SIDE = 1e-8
-#: tiles from which on it pays to look for fewer states, and of how many candidates some tell which do
-MANY_TILES, TELLING = 1000, 256
+#: tiles from which on it pays to find fewer states, and candidates from which those that are sampled are chosen
+MANY_TILES, DRAWN = 1000, 256
 #: tiles whose prices are compared, and by how much they may differ, relative to what a pass may be off
 COMPARED_TILES, SHARE_OF_FEWER = 8, 0.2
 
@@ -245,11 +245,11 @@ class GeneralCandidates(CandidatePass[PricingStates]):
         scene, packed = self._packed_scene(states), self._packed(states, self.chosen)
         runs = [run for each in states.scenes for place in self._places for run in _runs(each, place)]
         rng = np.random.default_rng(1)
-        places = np.stack([rng.integers(0, len(numbers), TELLING) for numbers in self.chosen])
+        places = np.stack([rng.integers(0, len(numbers), DRAWN) for numbers in self.chosen])
         found: list[FewerStates | None] = []
         for k, run in enumerate(runs):
             change = run.change[:, 0]
-            works = np.empty((len(run.when), OF_CHANGES + change.shape[1], TELLING))
+            works = np.empty((len(run.when), OF_CHANGES + change.shape[1], DRAWN))
             degree = sample_works(*scene, *packed, k, places, works) if len(run.step) else 0
             found.append(fewer_states(run.step, works, degree, change, run.energy) if degree else None)
         return found if any(own is not None and len(own.state) for own in found) else []
