@@ -10,7 +10,8 @@ the records in `settings.scalarisations`,
     nbi                    U = 1 + max_i (g_i - a_i) / r_i                     one row a peak
     nc                     U = g_k,  and rows  sum_i n_i (g_i - a_i) <= 0      one row a peak; one for each choice
 
-or those that differ from the highest in one peak where choices are many, so that the bound formulation sees every peak.
+or, where choices are many, the highest of them and those that differ from the highest in one peak, so that the bound
+formulation sees every peak and every choice that ties.
 `nbi` is normal boundary intersection (Das and Dennis 1998) in the form of Pascoletti and Serafini, whose inequalities
 reach every point of a front; 1 keeps U away from zero, to which tolerances are relative. `nc` is the normal constraint
 (Messac, Ismail-Yahaya and Mattson 2003).
@@ -20,6 +21,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from heapq import heappop, heappush
 from itertools import product
 from math import prod
 from pkgutil import resolve_name
@@ -30,8 +32,8 @@ import numpy as np
 from mdstopo.optimizer.problem import Floats
 from mdstopo.settings.scalarisations import SCALARISATIONS
 
-#: rows that one U has at most, choices of peaks that are all taken, and peaks of one objective in a plane of `nc`
-ROWS, CHOICES, PEAKS = 120, 36, 6
+#: rows that one U has at most, and one plane of `nc`; choices of peaks that are all taken; the highest of more
+ROWS, LIMITS, CHOICES, HIGHEST = 120, 12, 36, 27
 
 #: values (P,) of an objective's peaks, highest first, and their gradients (P, N); no rows where none were asked for
 Part = tuple[Floats, Floats]
@@ -103,10 +105,12 @@ class Scalarisation:
         slopes: list[Floats] = []
         for plane in self.planes:
             # where a plane falls with an objective, its highest peak alone counts
-            counts = [min(len(part[0]), PEAKS) if n > 0.0 else 1 for n, part in zip(plane, parts, strict=True)]
-            choices = list(product(*(range(count) for count in counts)))
+            shares = [
+                n * self.transformed(part[0] if n > 0.0 else part[0][:1], i)[0]
+                for i, (n, part) in enumerate(zip(plane, parts, strict=True))
+            ]
             found = []
-            for choice in choices[:PEAKS]:
+            for choice in highest_choices(shares, LIMITS):
                 total, slope = 0.0, np.zeros(parts[0][1].shape[1])
                 for i, p in enumerate(choice):
                     g, factor = self.transformed(parts[i][0][p : p + 1], i)
@@ -115,7 +119,7 @@ class Scalarisation:
                         slope = slope + plane[i] * factor * parts[i][1][p]
                 found.append((total, slope))
             found.sort(key=lambda each: -each[0])
-            found += [found[-1]] * (PEAKS - len(found))
+            found += [found[-1]] * (LIMITS - len(found))
             values += [each[0] for each in found]
             slopes += [each[1] for each in found]
         return np.array(values), np.array(slopes).reshape(len(values), parts[0][1].shape[1])
@@ -159,7 +163,7 @@ class SumOfPowers(Formula):
         terms = [self.term(one, i, values, k) for k, (i, (values, _)) in enumerate(zip(one.active, parts, strict=True))]
         rows, gradients = [], []
         wanted = all(len(part[1]) for part in parts)
-        for choice in _choices([len(values) for values, _ in terms]):
+        for choice in _choices([shares for shares, _ in terms]):
             total, factor = self.total(sum(float(terms[k][0][p]) for k, p in enumerate(choice)))
             slopes = [factor * float(terms[k][1][p]) for k, p in enumerate(choice)]
             rows.append(total)
@@ -284,15 +288,40 @@ def formula_of(method: str) -> Formula:
     return cast(Formula, resolve_name(SCALARISATIONS[method].made_by)())
 
 
-def _choices(counts: Sequence[int]) -> list[tuple[int, ...]]:
-    """Which peak of each objective: all choices where they are few, else those in which one is not the highest.
+def _choices(shares: Sequence[Floats]) -> list[tuple[int, ...]]:
+    """Which peak of each objective: all choices where they are few; else those whose sums are highest, and those in
+    which one peak is not the highest.
 
-    What the others would add, trials tell as they come: their highest choice is always among these.
+    shares (P_i,): what the peaks of each objective add, highest first. Where several objectives have peaks that tie, U
+    has no descent only by all choices of these together. What lower choices would add, trials tell as they come.
     """
+    counts = [len(one) for one in shares]
     if prod(counts) <= CHOICES:
         return list(product(*(range(count) for count in counts)))
     top = (0,) * len(counts)
-    return [top] + [(*top[:k], p, *top[k + 1 :]) for k, count in enumerate(counts) for p in range(1, count)]
+    single = [(*top[:k], p, *top[k + 1 :]) for k, count in enumerate(counts) for p in range(1, count)]
+    return list(dict.fromkeys(highest_choices(shares, HIGHEST) + single))
+
+
+def highest_choices(shares: Sequence[Floats], most: int) -> list[tuple[int, ...]]:
+    """The choices of one peak of each objective whose sums are largest, at most so many, the highest first.
+
+    shares (P_i,): what the peaks of each objective add, highest first. From a choice, those that take the next peak of
+    one objective are the next to be looked at; none of them has a larger sum (best-first search).
+    """
+    top = (0,) * len(shares)
+    waiting, seen = [(-sum(float(one[0]) for one in shares), top)], {top}
+    found: list[tuple[int, ...]] = []
+    while waiting and len(found) < most:
+        less, choice = heappop(waiting)
+        found.append(choice)
+        for k, one in enumerate(shares):
+            p = choice[k] + 1
+            after = (*choice[:k], p, *choice[k + 1 :])
+            if p < len(one) and after not in seen:
+                seen.add(after)
+                heappush(waiting, (less + float(one[p - 1] - one[p]), after))
+    return found
 
 
 def _sorted(rows: Floats, gradients: Floats) -> tuple[Floats, Floats]:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdstopo.optimizer.scalarisation import NotPositiveError, Scalarisation
+from mdstopo.optimizer.scalarisation import NotPositiveError, Scalarisation, highest_choices
 
 N = 5
 LOW, HIGH = np.array([1.0, 2.0, 0.5]), np.array([5.0, 9.0, 3.0])
@@ -84,7 +84,7 @@ def test_every_row_has_its_own_gradient(method):
         assert (plus - minus) / (2 * h) == pytest.approx(gradients[:, d], rel=1e-6, abs=1e-7)
     limits, slopes = one.limits(parts_at(peaks, x, one.active))
     if method == "nc":
-        assert len(limits) == 12  # a fixed number, so that runs can be stored
+        assert len(limits) == 24  # a fixed number, so that runs can be stored
         for d in range(N):
             step = np.eye(N)[d] * h
             plus, minus = (one.limits(parts_at(peaks, x + s * step, one.active))[0] for s in (1, -1))
@@ -121,3 +121,42 @@ def test_a_product_of_something_that_is_not_positive_is_none_and_names_it():
         one.rows([(np.array([1.0]), np.zeros((1, N))), (np.array([-1.0]), np.zeros((1, N)))])
     assert caught.value.args == (1,)
     assert np.isnan(one.values(np.array([[1.0, 5.0, -1.0]]))[0])
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_the_highest_choices_are_those_of_the_largest_sums(seed):
+    rng = np.random.default_rng(seed)
+    shares = [np.sort(rng.normal(size=k))[::-1] for k in rng.integers(1, 6, 3)]
+    every = sorted((sum(one) for one in itertools.product(*shares)), reverse=True)
+    found = highest_choices(shares, 20)
+    assert len(set(found)) == len(found) == min(20, len(every))
+    assert [sum(one[p] for one, p in zip(shares, choice, strict=True)) for choice in found] == pytest.approx(every[:20])
+
+
+@pytest.mark.parametrize("method", ["weighted_exponential", "weighted_sum", "weighted_product"])
+def test_all_choices_of_peaks_that_tie_are_rows_however_many_peaks_lie_lower(method):
+    rng = np.random.default_rng(5)
+    tied, lower = [8.0, 8.0, 8.0], [4.0] * 20
+    one = made(method, rng, weights=(0.4, 0.6, 0.0))
+    parts = [(np.array(tied + lower), rng.normal(size=(23, N))) for _ in range(2)]
+    rows, gradients = one.rows(parts)
+    ties = gradients[rows > rows[0] * (1.0 - 1e-9)]
+    alone = one.rows([(values[:3], slopes[:3]) for values, slopes in parts])[1]
+    assert len(ties) == 9
+    assert np.sort(ties, axis=0) == pytest.approx(np.sort(alone, axis=0))
+
+
+def test_a_plane_of_nc_has_the_choices_that_tie():
+    """The peaks of both objectives that the plane rises with tie in pairs: that makes four choices."""
+    rng = np.random.default_rng(6)
+    plane = np.array([[1.0, 2.0, -1.0]])
+    one = Scalarisation("nc", np.ones(3), anchor=np.zeros(3), planes=plane)
+    parts = [(np.array([1.0, 1.0] + [0.5] * 9), rng.normal(size=(11, N))) for _ in range(3)]
+    values, slopes = one.limits(parts)
+    expected = [
+        parts[0][1][p] + 2.0 * parts[1][1][q] - parts[2][1][0] for p, q in itertools.product(range(2), repeat=2)
+    ]
+    assert values[:4] == pytest.approx(np.full(4, 2.0))
+    assert np.sort(slopes[:4], axis=0) == pytest.approx(np.sort(expected, axis=0))
+    assert values[4] < 2.0
