@@ -334,7 +334,7 @@ class BundleMethod:
 
     def _learn_curvature(self, state: GsaoState, new: Bundle, d: Floats) -> None:
         """Keep the step d (N,) and the change of the Lagrangian's gradient over it, where that can be told."""
-        change = self.model.gradient_change(state.bundle, new, d, state.multipliers)
+        change = self.model.gradient_change(state.bundle, new, d, state.multipliers, self._is_smooth(state))
         if change is None or not self.model.lengths(d)[0] > 0.0:
             return
         state.steps = self.model.learnt(state.steps, d)

@@ -22,7 +22,7 @@ from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.conic import Program, Solution, solve
 from mdstopo.optimizer.curvature import FEW, Curvature, learnt
 from mdstopo.optimizer.nearest_feasible import repair
-from mdstopo.optimizer.problem import Floats, LinearRows, largest_of_groups
+from mdstopo.optimizer.problem import Floats, Ints, LinearRows, largest_of_groups
 from mdstopo.optimizer.stack import Slopes, Stack, joined
 
 #: what violations cost, in multipliers of their limits: more than one, or the merit would be least where limits are
@@ -35,6 +35,8 @@ STEPS, FEW_STEPS = 60, 12
 FLOOR = 1e-5
 #: cosine of two gradients from which on they are taken for those of one peak
 MATCH_COSINE = 0.5
+#: the share of a smooth objective's multipliers that its own row has at least where gradients are compared
+LEAST_SHARE = 1e-12
 #: how much a rejected trial shrinks the box where its rows tell what stood in the way
 NULL_STEP_SHRINK = 0.7
 #: how far a row may lie below the highest, or from its limit, to compete in the residual, in largest gradient entries
@@ -106,7 +108,9 @@ class RowModel(Protocol):
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual, as the function `residual` has it."""
 
-    def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+    def gradient_change(
+        self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats, smooth: bool
+    ) -> Floats | None:
         """How the Lagrangian's gradient has changed over a step, as the function `gradient_change` has it."""
 
     def lengths(self, d: Floats) -> tuple[float, float]:
@@ -133,9 +137,11 @@ class DenseModel:
         """The projected KKT residual at x; see `RowModel.residual`."""
         return residual(own, x, self.space, penalty, steepest)
 
-    def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+    def gradient_change(
+        self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats, smooth: bool
+    ) -> Floats | None:
         """How the Lagrangian's gradient has changed over a step, as of `RowModel`."""
-        return gradient_change(bundle, new, d, multipliers)
+        return gradient_change(bundle, new, d, multipliers, smooth)
 
     def lengths(self, d: Floats) -> tuple[float, float]:
         """The largest entry and the length of a step, as of `RowModel`."""
@@ -229,31 +235,50 @@ def least_violation(bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Fl
     return subproblem(nothing.joined(only), x, space, box, weight, flat)
 
 
-def gradient_change(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+def gradient_change(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats, smooth: bool) -> Floats | None:
     """How the gradient of the Lagrangian has changed over a step d beyond what the rows foresee, (N,), or None.
 
-    The iterate's own rows that carried a multiplier are compared with those of the trial (`new`, seen from there) which
-    have nearly the same gradient: the same peak, moved. Rows from elsewhere have no gradient at the iterate; their
-    multipliers count for the own ones of their group.
+    Rows of the iterate, as `rows_to_compare` has them, are compared with those of the trial (`new`, seen from there)
+    which have nearly the same gradient: the same peak, moved. The only row of a smooth objective is the same however
+    much its gradient has turned.
     """
-    groups = int(max(bundle.group.max(initial=0), new.group.max(initial=0))) + 1
-    own = np.flatnonzero(bundle.own & (multipliers > 0.0))
-    total = np.bincount(bundle.group, weights=multipliers, minlength=groups)
-    mine = np.bincount(bundle.group[own], weights=multipliers[own], minlength=groups)
+    own, weights = rows_to_compare(bundle, multipliers, smooth)
     slopes, fresh = bundle.subset(own).slopes_at(d), new.slopes_at(np.zeros(len(d)))
     change, matched = np.zeros(len(d)), False
     sizes = np.sqrt((fresh**2).sum(axis=1))
-    for k, slope in zip(own.tolist(), slopes, strict=True):
+    for k, weight, slope in zip(own.tolist(), weights.tolist(), slopes, strict=True):
         size = float(np.sqrt(slope @ slope))
-        if size == 0.0 or mine[bundle.group[k]] == 0.0:
+        same = np.flatnonzero(new.group == bundle.group[k])
+        if size * weight == 0.0 or not len(same):
             continue
-        cosine = np.where(new.group == bundle.group[k], fresh @ slope / np.maximum(size * sizes, 1e-300), -1.0)
-        best = int(cosine.argmax()) if len(cosine) else 0
-        if len(cosine) and cosine[best] >= MATCH_COSINE:
-            weight = multipliers[k] * total[bundle.group[k]] / mine[bundle.group[k]]
-            change += weight * (fresh[best] - slope)
+        cosine = fresh[same] @ slope / np.maximum(size * sizes[same], 1e-300)
+        best = int(cosine.argmax())
+        if cosine[best] >= least_cosine(bundle, new, k, smooth):
+            change += weight * (fresh[same[best]] - slope)
             matched = True
     return change if matched else None
+
+
+def rows_to_compare(bundle: Bundle, multipliers: Floats, smooth: bool) -> tuple[Ints, Floats]:
+    """The iterate's own rows that tell how the Lagrangian's gradient changes: their places (K,) and their weights (K,).
+
+    These are rows that carry a multiplier, and those of a smooth objective in any case. Rows from elsewhere have no
+    gradient at the iterate; their multipliers count for the own ones of their group.
+    """
+    groups = int(bundle.group.max(initial=0)) + 1
+    carried = np.where(smooth & (bundle.group == 0), np.maximum(multipliers, LEAST_SHARE), multipliers)
+    own = np.flatnonzero(bundle.own & (carried > 0.0))
+    total = np.bincount(bundle.group, weights=multipliers, minlength=groups)
+    mine = np.bincount(bundle.group[own], weights=carried[own], minlength=groups)
+    group = bundle.group[own]
+    return own, carried[own] * total[group] / mine[group]
+
+
+def least_cosine(bundle: Bundle, new: Bundle, k: int, smooth: bool) -> float:
+    """The cosine of two gradients from which on row k of the iterate is taken for the same as one of the trial's."""
+    group = bundle.group[k]
+    only = int((bundle.own & (bundle.group == group)).sum()) == int((new.group == group).sum()) == 1
+    return -np.inf if smooth and group == 0 and only else MATCH_COSINE
 
 
 def lower_bound(rows: Bundle, trial: Trial, x: Floats, space: FeasibleSet, penalty: Floats) -> float:

@@ -9,7 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.competing_rows import FLOOR, MATCH_COSINE, Around, FeasibleSet, SecantPairs, Trial
+from mdstopo.optimizer.competing_rows import (
+    FLOOR,
+    Around,
+    FeasibleSet,
+    SecantPairs,
+    Trial,
+    least_cosine,
+    rows_to_compare,
+)
 from mdstopo.optimizer.nearest_feasible import ROUNDING, repair
 from mdstopo.optimizer.problem import Floats, Ints, largest_of_groups
 from mdstopo.optimizer.stack import Slopes, Stack, joined
@@ -127,12 +135,11 @@ class WideModel:
         missing = abs(1.0 - float(theta[:K][objective].sum()))
         return max(moved, float(gaps.sum() + slack.sum()) / steepest, missing)
 
-    def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+    def gradient_change(
+        self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats, smooth: bool
+    ) -> Floats | None:
         """How the Lagrangian's gradient has changed over a step, as of `RowModel`."""
-        groups = int(max(bundle.group.max(initial=0), new.group.max(initial=0))) + 1
-        own = np.flatnonzero(bundle.own & (multipliers > 0.0))
-        total_ = np.bincount(bundle.group, weights=multipliers, minlength=groups)
-        mine = np.bincount(bundle.group[own], weights=multipliers[own], minlength=groups)
+        own, carried = rows_to_compare(bundle, multipliers, smooth)
         old, fresh = _stack(bundle.slope)[own], _stack(new.slope)
         rows = [(row, False) for row in (*old.rows, *fresh.rows)]
         places = self.pool.places(rows, self.unit)
@@ -141,14 +148,13 @@ class WideModel:
         weights = np.zeros(len(rows))
         for i, k in enumerate(own.tolist()):
             same = np.flatnonzero((new.group == bundle.group[k]) & (size[len(own) :] > 0.0))
-            if size[i] == 0.0 or mine[bundle.group[k]] == 0.0 or not len(same):
+            if size[i] == 0.0 or not len(same):
                 continue
             cosine = products[i, len(own) + same] / (size[i] * size[len(own) + same])
             best = int(cosine.argmax())
-            if cosine[best] >= MATCH_COSINE:
-                weight = multipliers[k] * total_[bundle.group[k]] / mine[bundle.group[k]]
-                weights[i] -= weight
-                weights[len(own) + same[best]] += weight
+            if cosine[best] >= least_cosine(bundle, new, k, smooth):
+                weights[i] -= carried[i]
+                weights[len(own) + same[best]] += carried[i]
         if not weights.any():
             return None
         change = np.empty(len(d))

@@ -16,7 +16,7 @@ from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import Sample
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
-from tests.optimizer.toys import shaken_block
+from tests.optimizer.toys import Toy, shaken_block
 
 
 def ended(problem, smooth):
@@ -129,3 +129,44 @@ WAY, FORCE = "{displacement: {body: block, component: x}}", "{member_force: {gro
 def test_objectives_are_smooth_where_no_peak_that_was_not_told_can_rise(response, over_time, smooth) -> None:
     text = f"{SCENE}objectives: {{G: {{response: {response}, over_time: {over_time}}}}}\n"
     assert DesignProblem(Evaluator(read_case(text))).smooth is smooth
+
+
+def bundles(here, there, multipliers):
+    """The bundle of one row of the objective with slope `here`, one from elsewhere, and that of the trial, `there`."""
+    slopes = np.array([here, [9.0, 9.0]])
+    bundle = Bundle.of(Sample(1.0, np.ones(1), slopes[:1], np.zeros(0), np.zeros((0, 2))), np.arange(1))
+    elsewhere = Bundle.of(Sample(1.0, np.ones(1), slopes[1:], np.zeros(0), np.zeros((0, 2))), np.arange(1))
+    new = Bundle.of(Sample(1.0, np.ones(1), np.array([there]), np.zeros(0), np.zeros((0, 2))), np.arange(1))
+    return bundle.joined(elsewhere.moved(np.ones(2), 1.0)), new, np.array(multipliers)
+
+
+@pytest.mark.parametrize("multipliers", [[1.0, 0.0], [0.3, 0.7], [0.0, 1.0]])
+def test_curvature_is_learnt_from_the_only_row_of_a_smooth_objective_however_its_gradient_turns(multipliers) -> None:
+    bundle, new, y = bundles([1.0, 0.0], [-0.5, 2.0], multipliers)
+    assert bundle.own.tolist() == [True, False]
+    change = competing_rows.gradient_change(bundle, new, np.ones(2), y, smooth=True)
+    assert change == pytest.approx([-1.5, 2.0])
+    assert competing_rows.gradient_change(bundle, new, np.ones(2), y, smooth=False) is None
+
+
+def test_rows_whose_gradients_turn_far_are_others_where_a_smooth_objective_has_several() -> None:
+    one = Sample(1.0, np.ones(2), np.array([[1.0, 0.0], [0.0, 1.0]]), np.zeros(0), np.zeros((0, 2)))
+    other = Sample(1.0, np.ones(2), np.array([[-1.0, 0.1], [0.1, 1.0]]), np.zeros(0), np.zeros((0, 2)))
+    bundle, new = (Bundle.of(sample, np.arange(2)) for sample in (one, other))
+    change = competing_rows.gradient_change(bundle, new, np.ones(2), np.array([0.25, 0.75]), smooth=True)
+    assert change == pytest.approx([0.75 * 0.1, 0.0])
+
+
+def test_a_curved_valley_is_followed_to_its_end() -> None:
+    """Rosenbrock's function of ten numbers, whose gradient turns by more than 60 degrees in most steps."""
+
+    def rows(x):
+        z = 2.4 * x - 1.2
+        beside, slope = z[1:] - z[:-1] ** 2, np.zeros(len(x))
+        slope[1:] += 200.0 * beside
+        slope[:-1] -= 400.0 * z[:-1] * beside + 2.0 * (1.0 - z[:-1])
+        return np.array([1.0 + float((100.0 * beside**2 + (1.0 - z[:-1]) ** 2).sum())]), 2.4 * slope[None]
+
+    state = ended(Toy(rows, np.full(10, 0.1), 0.0, 1.0), smooth=True)
+    assert state.evaluations < 110
+    assert state.best_objective == pytest.approx(1.0, abs=1e-9)
