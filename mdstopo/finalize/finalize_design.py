@@ -209,7 +209,8 @@ def finalize(
     told: list[str] = []
     text, difference = "", None
     source, sized = reduced, now
-    if found.status.usable and (not count or np.any(now[:count] ** reduced.power > 0.0)):
+    # without any size there is still something to write where parameters of laws have been chosen
+    if found.status.usable and (not count or reduced.variables or np.any(now[:count] ** reduced.power > 0.0)):
         content, told = final_content(content_of(case), reduced, own, now)
         text = head(int(np.count_nonzero(now[:count] ** reduced.power > 0.0))) + text_of(content)
         final = _read(text, place)
@@ -233,11 +234,17 @@ def finalize(
 
 
 def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...]:
-    """Sentences about objectives that are more than `WORSE` worse in the last column than in the first."""
+    """Sentences about objectives that are more than `WORSE` worse in the last column than in the first.
+
+    None about objectives of weight 0, which a run only tells.
+    """
+    weights = case.combine.weights if case.combine is not None else {}
     if not columns or not all(columns[k].evaluation.status.usable for k in (0, -1)):
         return ()
     told = []
     for objective in case.objectives:
+        if weights.get(objective.name, 1.0) == 0.0:
+            continue
         before, now = (columns[k].evaluation.objectives[objective.name] for k in (0, -1))
         loss = (before - now if objective.sense == "maximize" else now - before) / abs(before) if before else 0.0
         if loss > WORSE:

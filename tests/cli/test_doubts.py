@@ -155,6 +155,16 @@ def test_a_final_design_much_worse_than_the_full_one_is_told(sense: str, now: fl
         assert "20.0% worse than the full design promised" in found[0]
 
 
+def test_an_objective_of_weight_zero_that_has_become_worse_is_not_told() -> None:
+    text = CRATE.format(**PLAIN).replace("objectives:", "objectives:\n  H: {response: energy, over_time: mean}")
+    columns = [evaluated(1.0), evaluated(1.5)]
+    for column, value in zip(columns, (1.0, 2.0), strict=True):
+        column.evaluation.objectives["H"] = value
+    for weight, names in ((0, ["G"]), (1, ["H", "G"])):
+        case = read_case(f"{text}combine: {{weights: {{G: 1, H: {weight}}}}}\n")
+        assert [sentence.split()[0] for sentence in worse_than_promised(case, columns)] == names
+
+
 def test_how_much_worse_than_nearly_nothing_is_not_told_in_percent() -> None:
     found = worse_than_promised(read_case(CRATE.format(**PLAIN)), [evaluated(1e-14), evaluated(0.3)])
     assert "G of the final design is far worse than the full design promised: 0.3 in place of 1e-14" in found[0]

@@ -292,6 +292,41 @@ def test_a_result_becomes_a_case_that_repeats_it(capsys: pytest.CaptureFixture[s
     assert "7 present, 0 grey, 0 absent of 7" in out
 
 
+UNWANTED = """\
+format: 1
+time: {end: 0.1}
+bodies:
+  load: {mass: 2, inertia: 0.1, position: [0, 0], velocity: [1, 0]}
+points:
+  eye: {body: load, grid: {list: [[0, 0]]}}
+  posts: {body: ground, grid: {list: [[-1, 0], [-1, 0.5]]}}
+members:
+  ropes: {from: eye, to: posts, law: {type: spring, stiffness: 100}}
+  push:
+    from: eye
+    to: {body: ground, at: [-2, 0]}
+    law: {type: pulse, peak: -20, rate: 1e4, time: 0.05}
+    design: false
+design: {initial: 0.5, lower: 0, variables: {peak: {group: push, parameter: peak, lower: -80, upper: -10}}}
+objectives:
+  speed: {response: {velocity: {body: load, component: x}}, over_time: final, sense: maximize}
+"""
+
+
+def test_chosen_parameters_are_written_where_no_member_is_wanted(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("unwanted.yaml").write_text(UNWANTED)
+    assert call(capsys, "run", "unwanted.yaml", "--out", "unwanted.h5", "--quiet")[0] == 0
+    status, _, err = call(capsys, "finalize", "unwanted.h5", "--keep", "1", "--out", "unwanted.final.yaml")
+    assert status == 0, err
+    final = load_case("unwanted.final.yaml")
+    assert [group.name for group in final.members] == ["push"]
+    reached = Evaluator(final).evaluate(final.start, gradient=False).objectives["speed"]
+    with h5py.File("unwanted.h5") as file:
+        assert file["design/alpha"][()].max() == 0.0
+        assert reached == pytest.approx(file["iterations/objectives"][-1, 0], rel=1e-7)
+    assert reached > 1.1
+
+
 def test_a_threshold_keeps_what_reaches_it_and_the_table_says_all(capsys: pytest.CaptureFixture[str]) -> None:
     call(capsys, "run", "in/probe.yaml", "--out", "probe.h5", "--quiet")
     with h5py.File("probe.h5") as file:
