@@ -207,12 +207,15 @@ def front_rows(names: list[str], part: "Mapping[str, Any]") -> list[list[str]]:
 
 
 def quality_rows(names: list[str], numbers: "Mapping[str, Any]", part: "Mapping[str, Any]") -> list[list[str]]:
-    """Utopia and maxima that the points were found with, and how good the front is."""
+    """Utopia and maxima that the points were found with, where there are any yet, and how good the front is."""
+    import numpy as np
+
     from mdstopo.plan.front_measures import REFERENCE
 
     rows = [
         [title, ", ".join(f"{name} {number(value)}" for name, value in zip(names, part[title][0], strict=True))]
         for title in ("utopia", "maxima")
+        if not np.isnan(part[title][0]).any()
     ]
     if "ideal" in part:
         scale = "; ".join(

@@ -435,9 +435,9 @@ class _FrontRun:
         return case, replace(front, points=points, ends=tuple(told(each) for each in front.ends))
 
     def so_far(self) -> Front:
-        """What the plan has reached; utopia and maxima are not known before the ends are."""
+        """What the plan has reached; utopia and maxima are NaN before the ends are known."""
         planner = self.planner
-        known = planner.request.signs if planner.ends else np.full(planner.m, np.nan)
+        known = planner.request.signs if planner.scaled else np.full(planner.m, np.nan)
         points = tuple(planner.best.get(j) for j in range(len(self.ask.directions)))
         return Front(points, tuple(planner.ends), known * planner.lowest, known * planner.highest)
 

@@ -107,6 +107,27 @@ def test_a_front_that_is_stopped_goes_on_where_it_was_and_ends_the_same():
     assert_equal("whole.h5", "parts.h5")
 
 
+@pytest.mark.parametrize(("solves", "known"), [(2, False), (5, True)], ids=["ends alone", "ends crossed"])
+def test_a_front_that_is_stopped_tells_utopia_and_maxima_only_once_they_are_known(solves, known, capsys):
+    """Each objective alone has been optimised after two solves; the ends are chosen once each was begun at the other's
+    optimum, too. What stood in their places was 0 and 1."""
+    done = [0]
+    run_front(
+        read_case(CASE), Ask(spread(5)), path=Path("parts.h5"), workers=1,
+        on_progress=lambda snapshot: done.__setitem__(0, snapshot.done), stop_requested=lambda: done[0] >= solves,
+    )  # fmt: skip
+    part = contents("parts.h5")
+    assert len(part["pareto/tasks/key"]) == solves
+    for name in ("utopia", "maxima"):
+        assert np.isfinite(part[f"pareto/{name}"]).all() == known
+    assert run_group(["show", "parts.h5"]) == 0
+    assert ("utopia" in capsys.readouterr().out) == known
+    if known:
+        ends = part["pareto/ends"]
+        assert np.array_equal(part["pareto/utopia"][0], ends.min(axis=0))
+        assert np.array_equal(part["pareto/maxima"][0], ends.max(axis=0))
+
+
 def test_a_front_that_is_killed_goes_on_from_its_file():
     command = [sys.executable, "-m", "mdstopo", "pareto", "probe.yaml", "--points", "41", "--starts", "3", "--quiet"]
     whole = subprocess.run([*command, "--out", "whole.h5", "--workers", "1"], check=False)
