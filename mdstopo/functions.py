@@ -39,7 +39,8 @@ class Responses:
     """Objectives, then excesses of constraints over their bounds, of the designs of a case; each is evaluated once.
 
     names: of all of them. x0, lower, upper (n,): the initial design, and bounds. Raises NoValueError where a design
-    cannot be computed.
+    cannot be computed. Where a member or a contact only just touches, derivatives are those of one side, and optimisers
+    go on with them, as that of `run` does.
     """
 
     def __init__(self, case: Case, method: str = "auto") -> None:
@@ -61,7 +62,7 @@ class Responses:
         if self._last is None or not np.array_equal(self._last[0], asked):
             alpha, values = asked[: self.case.n_design], self.case.space.named(asked)
             found = evaluate(self.case, alpha, variables=values, method=self._method)
-            if not found.status.ok:
+            if not found.status.usable:
                 raise NoValueError(f"{found.status.value}: {found.message}")
             self._last = asked, *self._rows(found)
         return self._last[1].copy(), self._last[2].copy()

@@ -63,6 +63,14 @@ def test_a_design_that_cannot_be_computed_says_why(case, monkeypatch):
         Responses(case).at(case.start)
 
 
+def test_a_design_in_which_something_only_just_touches_has_values_and_derivatives_of_one_side(case, monkeypatch):
+    found = mdstopo.evaluate(case)
+    monkeypatch.setattr("mdstopo.functions.evaluate", lambda *a, **k: found._replace(status=Status.GRAZING))
+    values, slopes = Responses(case).at(case.start)
+    assert values[0] == found.objectives["G"]
+    assert np.array_equal(slopes[0], found.gradients["G"])
+
+
 def test_scipy_finds_the_optimum_of_run(case):
     optimize = pytest.importorskip("scipy.optimize")
     found = optimize.minimize(**Responses(case).for_scipy(), method="SLSQP", options={"maxiter": 200, "ftol": 1e-12})
