@@ -33,6 +33,9 @@ from mdstopo.status import RunStatus, Status
 EQUAL = 1e-5
 # What is left of the step that led to a failed evaluation.
 RETREAT = 0.5
+# Iterations after which the separable model hands a smooth objective over: by then it has chosen among optima, and from
+# there curvature leads on sooner than it does.
+CHOSEN = 30
 
 
 class Method(Protocol):
@@ -211,12 +214,13 @@ class Gsao:
         return self.bundle
 
     def _change_method(self, state: GsaoState, bundle: BundleMethod) -> bool:
-        """Whether the bundle method takes over or begins anew, because the method in use gets no further."""
+        """Whether the bundle method takes over or begins anew, because the method in use gets no further, or slowly."""
         stuck = self._is_stuck(state)
         if state.uses_bundle:
             return bundle.begin_anew(state, stuck)
         tolerance = self.settings.tolerance
-        if not stuck or (state.kkt <= tolerance and state.violation <= tolerance):
+        slow = self.smooth and state.iteration >= CHOSEN
+        if not (stuck or slow) or (state.kkt <= tolerance and state.violation <= tolerance):
             return False
         state.trust = max(state.trust, RESET_TRUST)
         bundle.begin(state)

@@ -94,7 +94,9 @@ def _approach(model, scale, stated, stated_v, q, v, workspace, push):
     length = 1.0
     for _ in range(STEPS):
         size = _by_mass(model, pull, pull)
-        largest = np.abs(pull).max()
+        largest = 0.0
+        for d in range(n):
+            largest = max(largest, abs(pull[d]))
         if not size > NEAREST**2 * way or largest <= NONE_LEFT * min(moved_most(model, q, scale), scale):
             return
         length = min(length, FAR * min(scale, 1.0) / largest)
