@@ -107,6 +107,7 @@ class DesignProblem:
         few, many = Rows(*NEAR, cones=cones), Rows(*ALL, cones=cones)
         #: the peaks that an evaluation is asked for
         self.rows = (many if members else few) if self.competes else USUAL
+        self._enough: int | None = None
         fixed = [row for i, row in enumerate(case.constraints) if isinstance(row, VolumeRow) and i not in moving]
         self.linear = _linear_rows(fixed, self.space)
 
@@ -189,16 +190,27 @@ class DesignProblem:
         return Sample(float(rows[0]), rows, gradients, limits, slopes, groups, *cones, *own_cones, info=info)
 
     def _with_all_that_compete(self, design: Floats, gradient: bool) -> Evaluation:
-        """An evaluation with as many rows as compete: more than usual where those are cut off among the largest."""
-        rows = self.rows
-        while True:
-            evaluation = self._evaluator.evaluate(design, gradient, rows=rows)
-            most = rows.most
-            if not gradient or most is None or not _is_cut_off(evaluation, most):
-                return evaluation
-            if GROWTH * most > min(MOST_ROWS, ROOM / len(self.initial)):
-                return evaluation
-            rows = rows._replace(most=GROWTH * most)
+        """An evaluation with as many rows as compete: more than usual where those are cut off among the largest.
+
+        It is begun with as many as the last design needed, since the next one mostly needs as many. What is told is the
+        same whatever was evaluated before: where fewer would have been enough, these are asked for.
+        """
+        few, room = self.rows.most, min(MOST_ROWS, ROOM / len(self.initial))
+        if not gradient or few is None:
+            return self._evaluator.evaluate(design, gradient, rows=self.rows)
+        most = self._enough or few
+        evaluation = self._evaluator.evaluate(design, gradient, rows=self.rows._replace(most=most))
+        needed = few
+        while needed < most and _is_cut_off(evaluation, needed):
+            needed *= GROWTH
+        if needed < most:
+            most = needed
+            evaluation = self._evaluator.evaluate(design, gradient, rows=self.rows._replace(most=most))
+        while _is_cut_off(evaluation, most) and GROWTH * most <= room:
+            most *= GROWTH
+            evaluation = self._evaluator.evaluate(design, gradient, rows=self.rows._replace(most=most))
+        self._enough = most
+        return evaluation
 
     def _cones(self, objective: Objective, sign: float, evaluation: Evaluation) -> "Cones":
         """The vectors whose norms are the rows of the only objective, as cones."""
@@ -324,12 +336,13 @@ class Cones(NamedTuple):
 
 
 def _is_cut_off(evaluation: Evaluation, most: int) -> bool:
-    """Whether as many peaks of anything were told as were asked for, and the last is near the largest."""
+    """Whether of so many peaks of anything, which were told, the last is near the largest."""
     if evaluation.all_compete or not evaluation.status.usable:
         return False
     told = [*evaluation.peaks.values(), *evaluation.constraint_peaks.values()]
     return any(
-        len(peaks) == most and abs(peaks[-1].value - peaks[0].value) <= TIED * abs(peaks[0].value) for peaks in told
+        len(peaks) >= most and abs(peaks[most - 1].value - peaks[0].value) <= TIED * abs(peaks[0].value)
+        for peaks in told
     )
 
 
