@@ -209,8 +209,8 @@ def finalize(
     told: list[str] = []
     text, difference = "", None
     source, sized = reduced, now
-    # without any size there is still something to write where parameters of laws have been chosen
-    if found.status.usable and (not count or reduced.variables or np.any(now[:count] ** reduced.power > 0.0)):
+    sizes_are_left = not count or bool(np.any(now[:count] ** reduced.power > 0.0))
+    if found.status.usable and (sizes_are_left or _chooses_of_what_is_given(reduced)):
         content, told = final_content(content_of(case), reduced, own, now)
         text = head(int(np.count_nonzero(now[:count] ** reduced.power > 0.0))) + text_of(content)
         final = _read(text, place)
@@ -231,6 +231,12 @@ def finalize(
     if equilibria.lost:
         return made(columns, words, "", [], None)
     return made(columns, words, text, told, difference)
+
+
+def _chooses_of_what_is_given(case: Case) -> bool:
+    """Whether a variable is a parameter of members that are no design variables, which stay whatever sizes become."""
+    given = {group.name for group in case.members if not group.design}
+    return any(given & set(variable.groups) for variable in case.variables)
 
 
 def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...]:

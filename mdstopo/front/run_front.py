@@ -437,7 +437,7 @@ class _FrontRun:
     def so_far(self) -> Front:
         """What the plan has reached; utopia and maxima are NaN before the ends are known."""
         planner = self.planner
-        known = planner.request.signs if planner.scaled else np.full(planner.m, np.nan)
+        known = planner.request.signs if planner.scale_is_known else np.full(planner.m, np.nan)
         points = tuple(planner.best.get(j) for j in range(len(self.ask.directions)))
         return Front(points, tuple(planner.ends), known * planner.lowest, known * planner.highest)
 

@@ -35,8 +35,6 @@ STEPS, FEW_STEPS = 60, 12
 FLOOR = 1e-5
 #: cosine of two gradients from which on they are taken for those of one peak
 MATCH_COSINE = 0.5
-#: the share of a smooth objective's multipliers that its own row has at least where gradients are compared
-LEAST_SHARE = 1e-12
 #: how much a rejected trial shrinks the box where its rows tell what stood in the way
 NULL_STEP_SHRINK = 0.7
 #: how far a row may lie below the highest, or from its limit, to compete in the residual, in largest gradient entries
@@ -253,7 +251,7 @@ def gradient_change(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats,
             continue
         cosine = fresh[same] @ slope / np.maximum(size * sizes[same], 1e-300)
         best = int(cosine.argmax())
-        if cosine[best] >= least_cosine(bundle, new, k, smooth):
+        if cosine[best] >= MATCH_COSINE or is_only_row(bundle, new, k, smooth):
             change += weight * (fresh[same[best]] - slope)
             matched = True
     return change if matched else None
@@ -262,11 +260,12 @@ def gradient_change(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats,
 def rows_to_compare(bundle: Bundle, multipliers: Floats, smooth: bool) -> tuple[Ints, Floats]:
     """The iterate's own rows that tell how the Lagrangian's gradient changes: their places (K,) and their weights (K,).
 
-    These are rows that carry a multiplier, and those of a smooth objective in any case. Rows from elsewhere have no
-    gradient at the iterate; their multipliers count for the own ones of their group.
+    These are rows that carry a multiplier, and the only row of a smooth objective in any case. Rows from elsewhere have
+    no gradient at the iterate; their multipliers count for the own ones of their group.
     """
     groups = int(bundle.group.max(initial=0)) + 1
-    carried = np.where(smooth & (bundle.group == 0), np.maximum(multipliers, LEAST_SHARE), multipliers)
+    only = smooth & bundle.own & (bundle.group == 0)
+    carried = np.where(only, 1.0, multipliers) if only.sum() == 1 else multipliers
     own = np.flatnonzero(bundle.own & (carried > 0.0))
     total = np.bincount(bundle.group, weights=multipliers, minlength=groups)
     mine = np.bincount(bundle.group[own], weights=carried[own], minlength=groups)
@@ -274,11 +273,10 @@ def rows_to_compare(bundle: Bundle, multipliers: Floats, smooth: bool) -> tuple[
     return own, carried[own] * total[group] / mine[group]
 
 
-def least_cosine(bundle: Bundle, new: Bundle, k: int, smooth: bool) -> float:
-    """The cosine of two gradients from which on row k of the iterate is taken for the same as one of the trial's."""
-    group = bundle.group[k]
-    only = int((bundle.own & (bundle.group == group)).sum()) == int((new.group == group).sum()) == 1
-    return -np.inf if smooth and group == 0 and only else MATCH_COSINE
+def is_only_row(bundle: Bundle, new: Bundle, k: int, smooth: bool) -> bool:
+    """Whether row k of the iterate is the only one of a smooth objective, and so the same as the trial's only one."""
+    only = int((bundle.own & (bundle.group == 0)).sum()) == int((new.group == 0).sum()) == 1
+    return smooth and bundle.group[k] == 0 and only
 
 
 def lower_bound(rows: Bundle, trial: Trial, x: Floats, space: FeasibleSet, penalty: Floats) -> float:

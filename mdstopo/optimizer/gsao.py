@@ -33,9 +33,9 @@ from mdstopo.status import RunStatus, Status
 EQUAL = 1e-5
 # What is left of the step that led to a failed evaluation.
 RETREAT = 0.5
-# Iterations after which the separable model hands a smooth objective over: by then it has chosen among optima, and from
-# there curvature leads on sooner than it does.
-CHOSEN = 30
+# Iterations after which the separable model hands a smooth objective over to the bundle method, whose curvature leads
+# on sooner from there.
+HAND_OVER = 30
 
 
 class Method(Protocol):
@@ -219,7 +219,7 @@ class Gsao:
         if state.uses_bundle:
             return bundle.begin_anew(state, stuck)
         tolerance = self.settings.tolerance
-        slow = self.smooth and state.iteration >= CHOSEN
+        slow = self.smooth and state.iteration >= HAND_OVER
         if not (stuck or slow) or (state.kkt <= tolerance and state.violation <= tolerance):
             return False
         state.trust = max(state.trust, RESET_TRUST)

@@ -131,7 +131,8 @@ class Problem(Protocol):
     A problem may have more, which is asked for by name (`getattr`, `hasattr`) and therefore not declared below:
 
     competes (bool, else False): whether the bundle method makes the steps from the start; else the separable
-        approximation begins, and the bundle method takes over where that gets no further.
+        approximation begins, and the bundle method takes over where that gets no further, of a smooth problem after 30
+        iterations at the latest.
     smooth (bool, else False): whether every row of U is told at each design, as a smooth function of x: no peaks, of
         which others may rise that were not told. The bundle method then trusts curvature rather than rows from far off.
     competitors (int or None, else None): how many of the highest rows the separable approximation takes; None: as the

@@ -10,8 +10,8 @@ the records in `settings.scalarisations`,
     nbi                    U = 1 + max_i (g_i - a_i) / r_i                     one row a peak
     nc                     U = g_k,  and rows  sum_i n_i (g_i - a_i) <= 0      one row a peak; one for each choice
 
-or, where choices are many, the highest of them and those that differ from the highest in one peak, so that the bound
-formulation sees every peak and every choice that ties.
+or, where choices are many, the 27 highest of them and those that differ from the highest in one peak, so that the bound
+formulation sees every peak, and all choices that tie up to that number.
 `nbi` is normal boundary intersection (Das and Dennis 1998) in the form of Pascoletti and Serafini, whose inequalities
 reach every point of a front; 1 keeps U away from zero, to which tolerances are relative. `nc` is the normal constraint
 (Messac, Ismail-Yahaya and Mattson 2003).
@@ -289,11 +289,11 @@ def formula_of(method: str) -> Formula:
 
 
 def _choices(shares: Sequence[Floats]) -> list[tuple[int, ...]]:
-    """Which peak of each objective: all choices where they are few; else those whose sums are highest, and those in
-    which one peak is not the highest.
+    """Which peak of each objective: all choices where they are few; else those whose sums are highest, and those that
+    differ from the highest in exactly one peak.
 
-    shares (P_i,): what the peaks of each objective add, highest first. Where several objectives have peaks that tie, U
-    has no descent only by all choices of these together. What lower choices would add, trials tell as they come.
+    shares (P_i,): what the peaks of each objective add, highest first. Where peaks of several objectives tie, it takes
+    all choices of these to tell that U has no descent. What lower choices would add, trials tell as they come.
     """
     counts = [len(one) for one in shares]
     if prod(counts) <= CHOICES:
@@ -310,17 +310,17 @@ def highest_choices(shares: Sequence[Floats], most: int) -> list[tuple[int, ...]
     one objective are the next to be looked at; none of them has a larger sum (best-first search).
     """
     top = (0,) * len(shares)
-    waiting, seen = [(-sum(float(one[0]) for one in shares), top)], {top}
+    waiting, seen = [(-sum(float(peaks[0]) for peaks in shares), top)], {top}
     found: list[tuple[int, ...]] = []
     while waiting and len(found) < most:
-        less, choice = heappop(waiting)
+        negative_sum, choice = heappop(waiting)
         found.append(choice)
-        for k, one in enumerate(shares):
+        for k, peaks in enumerate(shares):
             p = choice[k] + 1
             after = (*choice[:k], p, *choice[k + 1 :])
-            if p < len(one) and after not in seen:
+            if p < len(peaks) and after not in seen:
                 seen.add(after)
-                heappush(waiting, (less + float(one[p - 1] - one[p]), after))
+                heappush(waiting, (negative_sum + float(peaks[p - 1] - peaks[p]), after))
     return found
 
 

@@ -11,11 +11,12 @@ import numpy as np
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.competing_rows import (
     FLOOR,
+    MATCH_COSINE,
     Around,
     FeasibleSet,
     SecantPairs,
     Trial,
-    least_cosine,
+    is_only_row,
     rows_to_compare,
 )
 from mdstopo.optimizer.nearest_feasible import ROUNDING, repair
@@ -152,7 +153,7 @@ class WideModel:
                 continue
             cosine = products[i, len(own) + same] / (size[i] * size[len(own) + same])
             best = int(cosine.argmax())
-            if cosine[best] >= least_cosine(bundle, new, k, smooth):
+            if cosine[best] >= MATCH_COSINE or is_only_row(bundle, new, k, smooth):
                 weights[i] -= carried[i]
                 weights[len(own) + same[best]] += carried[i]
         if not weights.any():

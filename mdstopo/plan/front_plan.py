@@ -130,10 +130,10 @@ class Planner:
         self.table = np.zeros((0, self.m))
         self.beyond = np.zeros(0)
         self.ends: list[Found] = []
-        #: utopia and maxima, signed, and whether they come from ends: those are chosen before all have been crossed
+        #: utopia and maxima, signed, and whether they are known: only once each end was begun at the others' designs
         self.lowest = np.zeros(self.m)
         self.highest = np.ones(self.m)
-        self.scaled = False
+        self.scale_is_known = False
         #: by point, the best that was found for it under the present utopia and maxima, or in the last ones
         self.best: dict[int, Found] = {}
         self.solved: set[tuple[int, bytes]] = set()
@@ -353,7 +353,7 @@ class Planner:
         moved = bool(np.any(np.abs(lowest - self.lowest) > limit) or np.any(np.abs(highest - self.highest) > limit))
         if moved:
             self.lowest, self.highest = lowest, highest
-        self.scaled = True
+        self.scale_is_known = True
         return moved
 
     def _signed(self, found: Found) -> Floats:

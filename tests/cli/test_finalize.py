@@ -327,6 +327,20 @@ def test_chosen_parameters_are_written_where_no_member_is_wanted(capsys: pytest.
     assert reached > 1.1
 
 
+def test_nothing_is_written_where_what_was_chosen_is_left_out_with_its_members(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The stiffness of ropes that have no size is no choice that anything is left of."""
+    text = UNWANTED.replace("peak: {group: push, parameter: peak, lower: -80, upper: -10}",
+                            "k: {group: ropes, parameter: stiffness, lower: 50, upper: 200}")  # fmt: skip
+    Path("left_out.yaml").write_text(text)
+    assert call(capsys, "run", "left_out.yaml", "--out", "left_out.h5", "--quiet")[0] == 0
+    status, out, _ = call(capsys, "finalize", "left_out.h5", "--keep", "1", "--out", "left_out.final.yaml")
+    assert status == 1
+    assert "all members have alpha = 0" in out
+    assert not Path("left_out.final.yaml").exists()
+
+
 def test_a_threshold_keeps_what_reaches_it_and_the_table_says_all(capsys: pytest.CaptureFixture[str]) -> None:
     call(capsys, "run", "in/probe.yaml", "--out", "probe.h5", "--quiet")
     with h5py.File("probe.h5") as file:

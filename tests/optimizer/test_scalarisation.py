@@ -134,17 +134,18 @@ def test_the_highest_choices_are_those_of_the_largest_sums(seed):
     assert [sum(one[p] for one, p in zip(shares, choice, strict=True)) for choice in found] == pytest.approx(every[:20])
 
 
+@pytest.mark.parametrize("ties", [3, 5])
 @pytest.mark.parametrize("method", ["weighted_exponential", "weighted_sum", "weighted_product"])
-def test_all_choices_of_peaks_that_tie_are_rows_however_many_peaks_lie_lower(method):
+def test_all_choices_of_peaks_that_tie_are_rows_however_many_peaks_lie_lower(method, ties):
     rng = np.random.default_rng(5)
-    tied, lower = [8.0, 8.0, 8.0], [4.0] * 20
+    tied, lower = [8.0] * ties, [4.0] * 20
     one = made(method, rng, weights=(0.4, 0.6, 0.0))
-    parts = [(np.array(tied + lower), rng.normal(size=(23, N))) for _ in range(2)]
+    parts = [(np.array(tied + lower), rng.normal(size=(ties + 20, N))) for _ in range(2)]
     rows, gradients = one.rows(parts)
-    ties = gradients[rows > rows[0] * (1.0 - 1e-9)]
-    alone = one.rows([(values[:3], slopes[:3]) for values, slopes in parts])[1]
-    assert len(ties) == 9
-    assert np.sort(ties, axis=0) == pytest.approx(np.sort(alone, axis=0))
+    told = gradients[rows > rows[0] * (1.0 - 1e-9)]
+    alone = one.rows([(values[:ties], slopes[:ties]) for values, slopes in parts])[1]
+    assert len(told) == ties**2
+    assert np.sort(told, axis=0) == pytest.approx(np.sort(alone, axis=0))
 
 
 def test_a_plane_of_nc_has_the_choices_that_tie():
@@ -160,3 +161,15 @@ def test_a_plane_of_nc_has_the_choices_that_tie():
     assert values[:4] == pytest.approx(np.full(4, 2.0))
     assert np.sort(slopes[:4], axis=0) == pytest.approx(np.sort(expected, axis=0))
     assert values[4] < 2.0
+
+
+def test_every_peak_is_a_row_beside_the_highest_of_the_others_where_choices_are_many():
+    """Each peak lies lower than all choices of the highest five of both objectives."""
+    rng = np.random.default_rng(7)
+    one = made("weighted_sum", rng, weights=(0.4, 0.6, 0.0), normalized=False)
+    values = np.array([8.0] * 6 + list(np.linspace(4.0, 3.0, 20)))
+    parts = [(values, rng.normal(size=(26, N))) for _ in range(2)]
+    rows, _ = one.rows(parts)
+    for k, weight in enumerate((0.4, 0.6)):
+        for value in values[6:]:
+            assert np.isclose(rows, 8.0 - weight * (8.0 - value)).any(), (k, value)

@@ -11,7 +11,7 @@ from mdstopo.optimizer import competing_rows
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.bundle_method import FARTHEST, LEAST_LEFT, MOST_LEFT, _share_to_least
 from mdstopo.optimizer.curvature import learnt
-from mdstopo.optimizer.gsao import CHOSEN, Gsao
+from mdstopo.optimizer.gsao import HAND_OVER, Gsao
 from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import Sample
 from mdstopo.settings.optimizer_presets import settings
@@ -178,11 +178,11 @@ def test_a_smooth_energy_goes_on_by_curvature_after_the_separable_model_has_had_
     for smooth in (True, False):
         problem = shaken_block(40, 0.3)
         problem.competes, problem.smooth = False, smooth
-        optimizer = Gsao(problem, settings(max_iterations=CHOSEN + 1))
+        optimizer = Gsao(problem, settings(max_iterations=HAND_OVER + 1))
         state, uses = optimizer.start(), []
         while state.running:
             state = optimizer.step(state)
             uses.append(state.uses_bundle)
-        assert not any(uses[: CHOSEN - 1])
-        last[smooth] = uses[CHOSEN - 1 :]
+        assert not any(uses[: HAND_OVER - 1])
+        last[smooth] = uses[HAND_OVER - 1 :]
     assert last == {True: [True, True], False: [False, False]}

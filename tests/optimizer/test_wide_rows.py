@@ -5,16 +5,19 @@ import pytest
 
 from mdstopo.compiler.threads import VARIABLE
 from mdstopo.optimizer import conic, wide_numbers
+from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.competing_rows import FeasibleSet
 from mdstopo.optimizer.curvature import Curvature, learnt
 from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.stack import Stack
 from mdstopo.optimizer.state import State
+from mdstopo.optimizer.wide import Measures, Space
 from mdstopo.optimizer.wide_curvature import compact, known_curvature
 from mdstopo.optimizer.wide_interior import CURVED, EQUAL, LIMIT, LINE
 from mdstopo.optimizer.wide_program import FEW, Region, Room, WideProgram, solve
-from mdstopo.optimizer.wide_rows import Pool
+from mdstopo.optimizer.wide_rows import Pool, WideModel
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
 from tests.optimizer.toys import volume
@@ -299,3 +302,16 @@ def _at_least(problem):
         return Sample(float(problem.c @ x), np.array([problem.c @ x]), problem.c[None], limits, slopes)
 
     return evaluate
+
+
+def test_a_gradient_that_has_turned_far_teaches_curvature_where_the_objective_is_smooth():
+    rng = np.random.default_rng(4)
+    here = rng.normal(size=N)
+    there = 0.1 * rng.normal(size=N) - here
+    lower, upper, linear = np.zeros(N), np.ones(N), volume(N, 0.5 * N)
+    model = WideModel(FeasibleSet(lower, upper, linear, upper), Measures(Space.of(lower, upper, linear)))
+    old, new = (Bundle.of(Sample(1.0, np.ones(1), slope[None]), np.arange(1)) for slope in (here, there))
+    step = rng.normal(size=N)
+    found = model.gradient_change(old, new, step, np.ones(1), smooth=True)
+    assert found == pytest.approx(there - here, rel=1e-12)
+    assert model.gradient_change(old, new, step, np.ones(1), smooth=False) is None

@@ -95,7 +95,7 @@ def _approach(model, scale, stated, stated_v, q, v, workspace, push):
     for _ in range(STEPS):
         size = _by_mass(model, pull, pull)
         largest = 0.0
-        for d in range(n):
+        for d in range(n):  # no array expression: Numba names it by an address, which differs from process to process
             largest = max(largest, abs(pull[d]))
         if not size > NEAREST**2 * way or largest <= NONE_LEFT * min(moved_most(model, q, scale), scale):
             return
