@@ -93,8 +93,8 @@ def source():
 
     motion = SimpleNamespace(t=t, q=q, v=v, at=at, status=SimpleNamespace(ok=True))
     return SimpleNamespace(
-        case=case, alpha=alpha, design=alpha, view=view, title=TITLE, names=("sway",), load_cases=("default",),
-        engine=SimpleNamespace(trajectory=lambda design, name: motion),
+        case=case, stated=case, alpha=alpha, design=alpha, view=view, title=TITLE, names=("sway",),
+        load_cases=("default",), engine=SimpleNamespace(trajectory=lambda design, name: motion),
     )  # fmt: skip
 
 
@@ -225,7 +225,7 @@ def named(source):
     eight = [group.replace("lashings", f"lashings_of_the_{way}_quarter_{k}") for k in (1, 2) for way in WAYS]
     case = read_case(CASE.replace(group, "".join(eight)).replace("body: hull, component", "body: ball, component"))
     alpha = np.linspace(0.001, 1.0, case.n_design)
-    return SimpleNamespace(**{**vars(source), "case": case, "alpha": alpha, "design": alpha})
+    return SimpleNamespace(**{**vars(source), "case": case, "stated": case, "alpha": alpha, "design": alpha})
 
 
 def inside(figure, artist) -> bool:
@@ -325,7 +325,7 @@ def test_a_long_scene_stays_in_the_view_where_it_is_turned_from_its_end(source, 
         CASE.replace("corner: [-1.5, -1.2, 0], edges: [[3, 0, 0]", "corner: [-15, -1.2, 0], edges: [[30, 0, 0]")
     )
     place = tmp_path / "long.html"
-    place.write_text(page(report_content.content(SimpleNamespace(**{**vars(source), "case": case}))))
+    place.write_text(page(report_content.content(SimpleNamespace(**{**vars(source), "case": case, "stated": case}))))
     drawn = in_node(place)["seen"]["turned from the side"]
     places = np.concatenate([each["path"] for each in drawn if each["kind"] == "area"])
     assert (places >= 0.0).all()
