@@ -24,7 +24,14 @@ GRAVITY = np.array([12.0, -10.0])
 
 
 def draw_state(
-    axis: Any, source: Source, q: Floats, thick: Thickness, marks: list[Mark], gravity: Floats, faint: float = 1.0
+    axis: Any,
+    source: Source,
+    q: Floats,
+    thick: Thickness,
+    marks: list[Mark],
+    gravity: Floats,
+    faint: float = 1.0,
+    t: float | None = None,
 ) -> None:
     """Everything at a state q (3 n_bodies,).
 
@@ -35,10 +42,11 @@ def draw_state(
     marks: the symbols.
     gravity (2,): whose direction is shown.
     faint: how much of the colours of bodies is left, for overlays.
+    t: the time that is shown, s, or None.
     """
     draw_bodies(axis, source.case, q, faint)
     _contacts(axis, source.case, q)
-    draw_members(axis, source, q, lambda places: places, thick)
+    draw_members(axis, source, q, lambda places: places, thick, t)
     draw_marks(axis, marks)
     if np.any(gravity):
         draw_gravity(axis, gravity)

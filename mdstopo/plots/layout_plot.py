@@ -26,6 +26,9 @@ def draw(
 ) -> Any:
     """Draw the scene in one panel for each time (s), at the start where no time is given.
 
+    At a time, members of which no law acts then (`active_from`, `active_until`) are drawn as not acting. Without one
+    it is the design that is shown, with all its members as if they acted: also those that begin later.
+
     overlay: draw all times into one panel, earlier ones fainter.
     """
     case = source.case
@@ -40,7 +43,7 @@ def draw(
     stage = Stage(source, np.array([q for _, q in panels]), load_case, [t for t, _ in panels])
     count = 1 if overlay else len(panels)
     inches = _panel(stage, count)
-    names = legend_names(case, load_case)
+    names = legend_names(case, load_case, bool(times))
     above = height_of(len(names), columns_of(names, WIDTH, COLUMNS), legend_title(case, thick))
     high = float(inches[1]) + BELOW + ABOVE
     figure = module.Figure(figsize=(WIDTH, above + count * high))
@@ -52,7 +55,7 @@ def draw(
         stage.draw(axis, q, thick, (load_case, t), inches)
         if t is not None:
             axis.set_title(f"t = {t:g} s", loc="left")
-    add_legend(figure, axes[0], case, thick)
+    add_legend(figure, axes, case, thick)
     return figure
 
 
@@ -91,9 +94,9 @@ def _overlay(
     axis.set_title(f"t = {told} s", loc="left")
 
 
-def add_legend(figure: Any, axis: Any, case: Case, thick: Thickness) -> None:
+def add_legend(figure: Any, axes: list[Any], case: Case, thick: Thickness) -> None:
     """Add a legend of what is drawn, above the picture."""
-    handles, labels = legend_handles(axis)
+    handles, labels = legend_handles(*axes)
     title = legend_title(case, thick)
     columns = columns_of(labels, WIDTH, COLUMNS)
     figure.legend(handles, labels, loc="upper left", ncols=columns, title=title, **SETTING)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case
+from mdstopo.plots.acting import NOT_ACTING, any_timed
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.slack import belt_lengths
 from mdstopo.plots.style import MOST_NAMED
@@ -23,7 +24,7 @@ ROWS, MORE = 8, 0.01
 LONGEST, BEGINNING = 50, 30
 
 #: what else than bodies and groups may be in a legend
-WORDS = frozenset({"contact", "slack", *(glyph.words for glyph in glyphs().values())})
+WORDS = frozenset({"contact", "slack", NOT_ACTING, *(glyph.words for glyph in glyphs().values())})
 
 
 def name_in_legend(kind: str, name: str, case: Case | None = None) -> str:
@@ -41,15 +42,17 @@ def _words(case: Case) -> set[str]:
     """What legends of a case name besides bodies and groups."""
     found = {glyphs()[each.kind].words for load_case in case.load_cases for each in symbols(case, load_case.name)}
     found |= {"contact"} if case.contacts else set()
+    found |= {NOT_ACTING} if any_timed(case) else set()
     return found | {"slack" for group in case.members if belt_lengths(case, group) is not None}
 
 
-def legend_names(case: Case, load_case: str | None = None) -> list[str]:
-    """What a layout's legend may name, about in its order."""
+def legend_names(case: Case, load_case: str | None = None, at_times: bool = False) -> list[str]:
+    """What a layout's legend may name, about in its order. at_times: of a picture of a motion at some of its times."""
     groups = dict.fromkeys(families(case))
     names = [*["contact"] * bool(case.contacts), *(name_in_legend("body", body.name, case) for body in case.bodies)]
     names += [f"{name_in_legend('members', group, case)}*" for group in groups] if len(groups) <= MOST_NAMED else []
     names += ["slack"] * any(belt_lengths(case, group) is not None for group in case.members)
+    names += [NOT_ACTING] * (at_times and any_timed(case))
     return [*names, *{glyphs()[each.kind].words: None for each in symbols(case, load_case)}]
 
 
@@ -68,10 +71,17 @@ def height_of(count: int, columns: int, title: str | None) -> float:
     return (HEAD if title else EDGE) + LINE * rows + MORE * max(0, rows - ROWS)
 
 
-def legend_handles(axis: Any) -> tuple[list[Any], list[str]]:
-    """The entries of a legend, those of symbols last: lines whose marker is a shape of its own."""
+def legend_handles(*axes: Any) -> tuple[list[Any], list[str]]:
+    """The entries of a legend of drawings, those of symbols last: lines whose marker is a shape of its own.
+
+    What the first drawing does not have, as members that are slack or do not act at a later time, is there once.
+    """
     from matplotlib.path import Path
 
-    handles, labels = axis.get_legend_handles_labels()
+    handles, labels = axes[0].get_legend_handles_labels()
+    for axis in axes[1:]:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            if label not in labels:
+                handles, labels = [*handles, handle], [*labels, label]
     order = sorted(range(len(labels)), key=lambda k: isinstance(getattr(handles[k], "get_marker", str)(), Path))
     return [handles[k] for k in order], [labels[k] for k in order]

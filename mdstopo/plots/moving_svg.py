@@ -7,6 +7,7 @@ from html import escape
 import numpy as np
 
 from mdstopo.case.model import GROUND
+from mdstopo.plots.acting import DOTS, IDLE, acting
 from mdstopo.plots.beside import FREE, side_places, sideways
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.glyphs import Glyph, glyphs
@@ -56,9 +57,9 @@ def moving_svg(stage: Stage, thick: Thickness, states: Floats, timing: Timing | 
         f'<rect width="{width:.0f}" height="{height:.0f}" fill="{paper()}"/>',
     ]
     seconds = 1.0 if timing is None else timing.seconds
-    parts += [_drawn(line, frame, seconds) for line in _lines(stage, thick, states)]
-    parts += [*_rings(stage, frame, states, seconds), *_centres(stage, frame, states, seconds)]
     shown = [(None, None)] if timing is None else [(timing.load_case, t) for t in timing.times.tolist()]
+    parts += [_drawn(line, frame, seconds) for line in _lines(stage, thick, states, [t for _, t in shown])]
+    parts += [*_rings(stage, frame, states, seconds), *_centres(stage, frame, states, seconds)]
     marks = [
         stage.marks(q, every_symbol(stage.case, *each), frame.points) for q, each in zip(states, shown, strict=True)
     ]
@@ -95,14 +96,15 @@ class _Frame:
 @dataclass(frozen=True)
 class _Line:
     """A line that moves. style: its attributes; places (T, n, 2): its corners on the paper; beside: pixels (T, 1, 2)
-    by which it is shifted to the right and up; dashes, widths: of each state, where these change; ends: numbers of the
-    corners at which a loop ends, where it is an area of several."""
+    by which it is shifted to the right and up; dashes, widths, colours: of each state, where these change; ends:
+    numbers of the corners at which a loop ends, where it is an area of several."""
 
     style: str
     places: Floats
     beside: Floats | float = 0.0
     dashes: list[str] = field(default_factory=list)
     widths: list[str] = field(default_factory=list)
+    colours: list[str] = field(default_factory=list)
     ends: tuple[int, ...] = ()
 
 
@@ -115,7 +117,8 @@ def _drawn(line: _Line, frame: _Frame, seconds: float) -> str:
         return f'<path d="{words[0]}" {line.style}>{_animated("d", words, seconds)}</path>'
     words = [" ".join(each) for each in frames]
     move, style = _animated("points", words, seconds), line.style
-    for name, values in (("stroke-dasharray", line.dashes), ("stroke-width", line.widths)):
+    changing = (("stroke", line.colours), ("stroke-dasharray", line.dashes), ("stroke-width", line.widths))
+    for name, values in changing:
         style += f' {name}="{values[0]}"' if values else ""
         move += _animated(name, values, seconds, "discrete")
     return f'<polyline points="{words[0]}" {style}>{move}</polyline>'
@@ -222,31 +225,37 @@ def _pace(timing: Timing, height: float) -> str:
     )
 
 
-def _lines(stage: Stage, thick: Thickness, states: Floats) -> Iterator[_Line]:
-    """Everything that is drawn but symbols."""
+def _lines(stage: Stage, thick: Thickness, states: Floats, times: list[float | None]) -> Iterator[_Line]:
+    """Everything that is drawn but symbols. times: of the states, None where no time is shown."""
     yield from _touched(stage, states)
     for k, name in enumerate(stage.names):
         yield from _body(stage, name, ink("middle") if name == GROUND else colour(k + 2), states)
-    yield from _members(stage, thick, states)
+    yield from _members(stage, thick, states, times)
 
 
-def _members(stage: Stage, thick: Thickness, states: Floats) -> Iterator[_Line]:
+def _members(stage: Stage, thick: Thickness, states: Floats, times: list[float | None]) -> Iterator[_Line]:
+    """Lines of members: solid, dashed and thin while they are slack, dotted in grey while they do not act."""
     case = stage.case
     chosen, named = strongest(thick.shares, MOST), families(case)
-    dashed = " ".join(map(str, DASHES))
     order, widest = list(dict.fromkeys(named)), POINT * widest_of(sum(len(each) for each in chosen))
+    looks = [("none", 1.0), (" ".join(map(str, DASHES)), THIN), (" ".join(map(str, DOTS)), 1.0)]
     every = zip(case.members, thick.shares, chosen, side_places(case, chosen), named, strict=True)
     for group, share, some, side, family in every:
-        drawn = [member_lines(case, group, q, stage.seen, some) for q in states]
+        acts = np.array([acting(stage.source, group, t) for t in times])
+        drawn = [member_lines(case, group, q, stage.seen, some, own) for q, own in zip(states, acts, strict=True)]
         ends = slice(None) if belt_lengths(case, group) is not None else slice(None, None, CORNERS - 1)
         places, slack = np.array([line for line, _ in drawn])[:, :, ends], np.array([hangs for _, hangs in drawn])
+        own_colour = colour(order.index(family))
         for i, member in enumerate(some.tolist()):
             width = NARROWEST + (widest - NARROWEST) * float(share[member])
-            style = f'fill="none" stroke="{colour(order.index(family))}"'
-            widths = [f"{THIN * width if hangs else width:.2f}" for hangs in slack[:, i]]
+            idle = ~acts[:, member]
+            look = np.where(idle, 2, slack[:, i]).tolist()  # which of `looks` it has
+            widths = [f"{min(POINT * IDLE, widest) if k == 2 else looks[k][1] * width:.2f}" for k in look]
             beside = (widest + FREE) * sideways(places[:, i], np.full(len(states), side[i]))[:, None]
-            dashes = [dashed if hangs else "none" for hangs in slack[:, i]] if slack[:, i].any() else []
-            yield _Line(style, places[:, i], beside, dashes, widths)
+            dashes = [looks[k][0] for k in look] if any(look) else []
+            colours = [ink("middle") if k == 2 else own_colour for k in look] if idle.any() else []
+            style = 'fill="none"' if colours else f'fill="none" stroke="{own_colour}"'
+            yield _Line(style, places[:, i], beside, dashes, widths, colours)
 
 
 def _touched(stage: Stage, states: Floats) -> Iterator[_Line]:

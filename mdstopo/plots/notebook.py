@@ -23,7 +23,7 @@ class InMemory(Source):
     """A case and one of its designs, for pictures that need no file."""
 
     def __init__(self, case: Case, design: Floats) -> None:
-        self.__dict__ |= {"case": case, "design": design, "alpha": design[: case.n_design]}
+        self.__dict__ |= {"case": case, "stated": case, "design": design, "alpha": design[: case.n_design]}
 
     @property
     def title(self) -> str:

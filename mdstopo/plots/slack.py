@@ -41,17 +41,29 @@ def spare_length(case: Case, group: MemberGroup, q: Floats) -> Floats:
 
 
 def member_lines(
-    case: Case, group: MemberGroup, q: Floats, seen: Callable[[Floats], Floats], some: NDArray[np.int64]
+    case: Case,
+    group: MemberGroup,
+    q: Floats,
+    seen: Callable[[Floats], Floats],
+    some: NDArray[np.int64],
+    acts: NDArray[np.bool_] | None = None,
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Lines (K, CORNERS, 2) of some (K,) of a group's members on the paper, and which of them are slack (K,).
 
     The page draws the same by `memberLine` in report/members.js.
 
     Taut ones are straight. A slack one hangs along gravity, or down the picture without, as the parabola that is as
-    long as it is: of depth h over a length L it is longer by 8 h^2 / (3 L), to leading order. seen: places (n, d) on
-    the paper (n, 2).
+    long as it is: of depth h over a length L it is longer by 8 h^2 / (3 L), to leading order.
+
+    case, group: whose members they are.
+    q: the state.
+    seen: places (n, d) on the paper (n, 2).
+    some: numbers of the members in the group.
+    acts (M,): which of all members of the group act; what does not is straight and not slack. None: all act.
     """
     places, spare = ends_at(case, group, q)[some], spare_length(case, group, q)[some]
+    if acts is not None:
+        spare = np.where(acts[some], spare, 0.0)
     apart = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
     deep = np.minimum(np.sqrt(0.375 * apart * spare), DEEPEST * apart)
     share = np.linspace(0.0, 1.0, CORNERS)[None, :, None]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
+from mdstopo.plots.windows_of_laws import active_windows
 from mdstopo.scene.design_map import as_designed
 from mdstopo.store.result_reader import ResultView, read_result
 from mdstopo.store.store_errors import DamagedError, StoreError
@@ -113,6 +114,11 @@ class Source:
             if each.name not in values:
                 raise DamagedError(f"{self.view.path}: damaged: it has no values of {each.name}")
         return np.concatenate([alpha, *(values[each.name] for each in self.stated.variables)])
+
+    @cached_property
+    def windows(self) -> dict[str, Floats]:
+        """When the laws of the design that is shown act, of groups of which any begins or ends (`active_windows`)."""
+        return active_windows(self.stated, self.design)
 
     @property
     def load_cases(self) -> tuple[str, ...]:

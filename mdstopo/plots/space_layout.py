@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import GROUND
+from mdstopo.plots.acting import acting
 from mdstopo.plots.cloud import scene_cloud
 from mdstopo.plots.legend import SETTING, columns_of, height_of, legend_handles, legend_names, name_in_legend
 from mdstopo.plots.member_lines import draw_members, legend_title
@@ -46,7 +47,9 @@ def draw_space(
     """The four views of each state; one below the other where there are several times, each in a row."""
     case = source.case
     solids = {name: solid(case, name) for name in [*(body.name for body in case.bodies), GROUND]}
-    cloud = scene_cloud(case, np.array([q for _, q in panels]), solids)
+    cloud = scene_cloud(
+        case, np.array([q for _, q in panels]), solids, lambda group, k: acting(source, group, panels[k][0])
+    )
     low, high = cloud.min(axis=0), cloud.max(axis=0)
     radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-12)
     seen = views(case, 0.5 * (low + high), radius)
@@ -54,7 +57,7 @@ def draw_space(
         name: [marks_at(case, symbols(case, load_case, t), q, view.seen, radius, view.signs) for t, q in panels]
         for name, view in seen.items()
     }
-    names = legend_names(case, load_case)
+    names = legend_names(case, load_case, panels[0][0] is not None)
     columns = columns_of(names, PAGE - MARGIN, COLUMNS)
     (places, inches), box, scale = _adapted(
         seen, (low, high), marks, len(panels), height_of(len(names), columns, legend_title(case, thick))
@@ -72,11 +75,11 @@ def draw_space(
             else:
                 _draw_frame(axis, view, size / scale, box)
             draw_scene(axis, source, view, q, solids)
-            draw_members(axis, source, q, view.seen, thick)
+            draw_members(axis, source, q, view.seen, thick, t)
             draw_marks(axis, marks[name][k])
             words = name if t is None or name != "front" else f"{name}, t = {t:g} s"
             axis.set_title(words, loc="left")
-    handles, labels = legend_handles(figure.axes[0])
+    handles, labels = legend_handles(*figure.axes[:: len(seen)])
     title = legend_title(case, thick)
     figure.legend(handles, labels, loc="upper left", ncols=columns, title=title, **SETTING)
     return figure

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import GROUND, Case
+from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.plots.acting import Mask, acting
 from mdstopo.plots.cloud import planar_cloud, scene_cloud
 from mdstopo.plots.drawn_plane import draw_bodies, draw_state, marks_of
 from mdstopo.plots.member_lines import draw_members
@@ -30,7 +31,8 @@ ACROSS, UP, MOST_TICKS = 0.42, 0.16, 8
 class Stage:
     """Draws the states (T, n) of a result, in a plane or as a view of space.
 
-    load_case, times: whose loads are shown, and when; None of a time shows each at its largest.
+    load_case, times: whose loads are shown, and when, and which members act then; None of a time shows each load at its
+    largest and all members as acting.
     """
 
     def __init__(
@@ -42,11 +44,15 @@ class Stage:
         self._windows: dict[tuple[float, ...], tuple[Floats, Floats]] = {}
         self._together = [self]
         self._states = [(states[k], (load_case, times[k] if times else None)) for k in chosen]
+
+        def acts(group: MemberGroup, k: int) -> Mask:
+            return acting(source, group, times[k] if times else None)
+
         if self.case.dimension == 3:
             self.solids = {name: solid(self.case, name) for name in self.names}
-            self._places = scene_cloud(self.case, states, self.solids)
+            self._places = scene_cloud(self.case, states, self.solids, acts)
         else:
-            self._places = planar_cloud(self.case, states)
+            self._places = planar_cloud(self.case, states, acts)
         self._look_at(self._places, self.case)
 
     def _look_at(self, places: Floats, upright: Case) -> None:
@@ -103,7 +109,7 @@ class Stage:
         axis: where it is drawn.
         q: the state.
         thick: how thick members are.
-        shown: the load case whose loads are drawn, and the time of them.
+        shown: the load case whose loads are drawn, and the time of them and of members that act.
         inches (2,): the size of the drawing.
         faint: how much of the colours of bodies is left, for overlays.
         """
@@ -112,7 +118,7 @@ class Stage:
         if self.case.dimension == 3:
             draw_perspective(axis, self.view, (low, high), inches)
             draw_scene(axis, self.source, self.view, q, self.solids)
-            draw_members(axis, self.source, q, self.view.seen, thick)
+            draw_members(axis, self.source, q, self.view.seen, thick, shown[1])
             draw_marks(axis, self._marks(q, shown, scale_of(low, high, inches)))
             return
         scale = scale_of(low, high, inches)
@@ -128,7 +134,7 @@ class Stage:
         axis.set_ylabel("y, m")
         loaded = self.case.load_cases[0] if shown[0] is None else self.case.load_case(shown[0])
         gravity = np.array(loaded.gravity, dtype=np.float64)
-        draw_state(axis, self.source, q, thick, self._marks(q, shown, scale), gravity, faint)
+        draw_state(axis, self.source, q, thick, self._marks(q, shown, scale), gravity, faint, shown[1])
 
     def draw_bodies(self, axis: Any, q: Floats, faint: float) -> None:
         """Bodies alone. faint: how much of their colours is left."""

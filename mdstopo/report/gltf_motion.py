@@ -1,6 +1,7 @@
 """The motion of a design as a glTF scene: a node for every body and member, an animation for every load case."""
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,16 +10,18 @@ from scipy.interpolate import CubicHermiteSpline
 
 from mdstopo._version import __version__
 from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.plots.acting import NOT_ACTING, acts_in
 from mdstopo.plots.beside import side_places
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.scenery import Floats, ends_at, start_state
 from mdstopo.plots.solids import Solid, convex, joined, solid
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import COLOURS
+from mdstopo.plots.style import COLOURS, ink
 from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.thickness import FAINT, families, strongest, thickness
 from mdstopo.plots.triangles import triangles
 from mdstopo.plots.views import upright
+from mdstopo.plots.windows_of_laws import is_timed
 from mdstopo.report.gltf_file import INDICES, LINES, POINTS, TRIANGLES, VERTICES, GltfFile
 from mdstopo.scene.quaternions import product, quaternions_of
 
@@ -29,8 +32,8 @@ TURN, FEWEST, LONGEST = 0.2, 121, 4001
 #: up to how much turn within a step of the integrator (rad) cubics between its ends may be taken; and by how much of
 #: the scene's size, or of a radian, these may be off
 SMOOTH, CUBIC_ERROR = 0.8, 2e-4
-#: shares of the scene's size: radius of the thickest member, of the thinnest, and of joints
-THICK, THIN, JOINT = 0.006, 0.001, 0.012
+#: shares of the scene's size: radius of the thickest member, of the thinnest, of one that does not act, and of joints
+THICK, THIN, IDLE, JOINT = 0.006, 0.001, 0.0005, 0.012
 #: share of the scene's size between the axes of members of the same two points: the thickest do not touch
 BESIDE = 2.5 * THICK
 #: below this share of its length a member is seen end on
@@ -184,19 +187,62 @@ class _Scene:
             drawn = (chosen, radius[chosen], BESIDE * self.size * side)
             first = self._tubes(group, drawn, self.first.q)
             moved = {name: self._tubes(group, drawn, poses.q) for name, poses in self.motions.items()}
+            acts = self._acts(group, chosen)
             for i, member in enumerate(chosen.tolist()):
-                place, turn, scale = (part[0, i] for part in first)
-                node = self.out.add(
-                    "nodes", name=f"{group.name} {member}", mesh=mesh, translation=place.tolist(),
-                    rotation=_xyzw(turn), scale=scale.tolist(), extras={"share": float(share[member])},
-                )  # fmt: skip
-                nodes.append(node)
-                self.moving[node] = {
-                    name: dict(zip(("translation", "rotation", "scale"), (part[:, i] for part in parts), strict=True))
-                    for name, parts in moved.items()
-                }
+                own_acts = {name: each[:, i] for name, each in acts.items()}
+                own_first = tuple(part[0, i] for part in first)
+                own_moved = {name: tuple(part[:, i] for part in parts) for name, parts in moved.items()}
+                shown = mesh, f"{group.name} {member}", float(share[member])
+                nodes += self._tube_nodes(shown, own_first, own_moved, own_acts)
         there = sum(int((share > FAINT).sum()) for share in shares)
         return nodes, there - sum(len(chosen) for chosen in some)
+
+    def _acts(self, group: MemberGroup, chosen: NDArray[np.int64]) -> dict[str, NDArray[np.bool_]]:
+        """(T, K) of each load case: which of some members (K,) of a group act at the times of its motion."""
+        if not is_timed(self.case, group):
+            return {name: np.ones((len(poses.t), len(chosen)), dtype=bool) for name, poses in self.motions.items()}
+        windows = self.source.windows[group.name][chosen]
+        return {
+            name: acts_in(windows, self.case.load_case(name).start + poses.t) for name, poses in self.motions.items()
+        }
+
+    def _tube_nodes(
+        self,
+        shown: tuple[int, str, float],
+        first: tuple[Floats, ...],
+        moved: dict[str, tuple[Floats, ...]],
+        acts: dict[str, NDArray[np.bool_]],
+    ) -> Iterator[int]:
+        """The node of a member, of no size while the member does not act, and then one that is thin and grey.
+
+        shown: its mesh, its name, its share of the thickest. first: translation (3,), rotation (4,) and scale (3,)
+        before any motion, at which it is drawn as one that acts; moved: the same (T, ...) in each load case; acts (T,):
+        whether it acts there.
+        """
+        mesh, name, share = shown
+        place, turn, scale = first
+        looks: list[tuple[int, str, Floats, dict[str, NDArray[np.bool_]], float | None]]
+        looks = [(mesh, name, scale, acts, None)]
+        if not all(each.all() for each in acts.values()):
+            idle = {case: ~each for case, each in acts.items()}
+            looks.append((self._idle, f"{name}, {NOT_ACTING}", np.zeros(3), idle, IDLE * self.size))
+        for own_mesh, own_name, own_scale, there, radius in looks:
+            node = self.out.add(
+                "nodes", name=own_name, mesh=own_mesh, translation=place.tolist(), rotation=_xyzw(turn),
+                scale=own_scale.tolist(), extras={"share": share},
+            )  # fmt: skip
+            self.moving[node] = {}
+            for case, (places, turns, scales) in moved.items():
+                sizes = scales if radius is None else scales * [0.0, 1.0, 0.0] + np.array([radius, 0.0, radius])
+                own = {"translation": places, "rotation": turns, "scale": sizes * there[case][:, None]}
+                self.moving[node][case] = own
+            yield node
+
+    @cached_property
+    def _idle(self) -> int:
+        """The mesh of members that do not act."""
+        primitive = self._faces(_tube(), self._material(ink("middle"), 1.0))
+        return self.out.add("meshes", name=NOT_ACTING, primitives=[primitive])
 
     def _tubes(
         self, group: MemberGroup, drawn: tuple[NDArray[np.int64], Floats, Floats], states: Floats

@@ -18,12 +18,17 @@ const shifted = (line, pixels) => {
   const [a, b] = [line[0], line[line.length - 1]], dx = b[0] - a[0], dy = b[1] - a[1], long = Math.hypot(dx, dy);
   return pixels && long ? line.map((p) => [p[0] + pixels * dy / long, p[1] - pixels * dx / long]) : line;
 };
-// a member on the screen; a slack one is thin and dashed
-const strokeMember = (g, hang, line, width, slack) => {
-  g.lineWidth = slack ? hang.thin * width : width;
-  if (slack && g.setLineDash) g.setLineDash(hang.dashes);
+// whether a member acts at a time: windows, from when on and until when each of its laws does, null where a side is open;
+// no windows, or no time: it does
+const actsAt = (windows, time) => !windows || time === null || windows.some(([from, until]) => (from === null || time >= from) && (until === null || time < until));
+// a member on the screen; a slack one is thin and dashed, one that does not act thin and dotted in grey
+const strokeMember = (g, hang, line, width, slack, acts) => {
+  const dashes = acts ? hang.dashes : hang.idle.dots;
+  g.lineWidth = acts ? (slack ? hang.thin * width : width) : hang.idle.width;
+  if (!acts) g.strokeStyle = hang.idle.colour;
+  if ((slack || !acts) && g.setLineDash) g.setLineDash(dashes);
   g.beginPath();
   line.forEach((p, k) => (k ? g.lineTo(p[0], p[1]) : g.moveTo(p[0], p[1])));
   g.stroke();
-  if (slack && g.setLineDash) g.setLineDash([]);
+  if ((slack || !acts) && g.setLineDash) g.setLineDash([]);
 };

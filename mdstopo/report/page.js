@@ -29,6 +29,7 @@
       parts.push(part);
     };
     if (!coloured && own.groups.length <= 16) own.groups.forEach((name, k) => entry(own.fixed[k] ? "\u2504" : "\u2501", name, COLOURS[k % COLOURS.length]));
+    if (motion() && own.windows.some((each) => each)) entry("\u2508", data.hang.idle.word, data.hang.idle.colour);
     const kinds = new Set(symbolsAt(data, state.load, null).map((each) => each.kind));
     for (const kind of kinds) entry(MARKS[kind] || "\u25cb", data.glyphs[kind].words, "#222222");
     at("legend").replaceChildren(...parts);

@@ -10,6 +10,7 @@ from mdstopo.case.model import GROUND, Case
 from mdstopo.case.responses.response_units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared, kept_iterates
+from mdstopo.plots.acting import DOTS, IDLE, NOT_ACTING
 from mdstopo.plots.beside import FREE, side_places
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.cloud import FAR
@@ -20,10 +21,12 @@ from mdstopo.plots.scenery import points_of, start_state
 from mdstopo.plots.slack import CORNERS, DASHES, DEEPEST, SLACK, THIN, belt_lengths, down
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
+from mdstopo.plots.style import ink
 from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.symbols import LOADS, Symbol, symbols
 from mdstopo.plots.thickness import families, strongest, thickness
 from mdstopo.plots.views import upright
+from mdstopo.plots.windows_of_laws import active_windows
 from mdstopo.report.fit_tables import fit_part
 from mdstopo.report.report_tables import best_iterate, constraint_rows, member_peaks, objective_rows, parts, peak_of
 from mdstopo.store.whole_front import whole_front
@@ -34,6 +37,8 @@ Floats = NDArray[np.float64]
 FRAMES, SAMPLES, SIMULATED, DRAWN = 81, 161, 60, 10_000
 #: moments beside the steps at which the largest forces are looked for
 PEAKS = 401
+#: pixels of a screen in a point
+PIXELS = 96.0 / 72.0
 
 
 def content(source: Source) -> dict[str, Any]:
@@ -66,7 +71,8 @@ def content(source: Source) -> dict[str, Any]:
         "symbols": _symbols(case),
         "far": FAR,
         "hang": {"slack": SLACK, "deepest": DEEPEST, "corners": CORNERS, "down": _rounded(down(case)),
-                 "thin": THIN, "dashes": DASHES, "free": FREE * 96.0 / 72.0},
+                 "thin": THIN, "dashes": DASHES, "free": FREE * PIXELS,
+                 "idle": {"word": NOT_ACTING, "width": IDLE * PIXELS, "dots": DOTS, "colour": ink("middle")}},
         "designs": _designs(source),
     }  # fmt: skip
     if case.dimension > 2:
@@ -272,7 +278,8 @@ def _members(source: Source, alpha: Floats) -> tuple[dict[str, Any], Chosen]:
     """Members that are thick enough to be seen, the thickest first where there are many; and which they are.
 
     Rows of: the number of the group, of both bodies, the ends in their coordinates, the thickness, the number in the
-    group. Of each row besides: the place beside others of the same ends (`side_places`), the length as a belt or null.
+    group. Of each row besides: the place beside others of the same ends (`side_places`), the length as a belt or null,
+    from when on and until when each of its laws acts or null (`active_windows`).
     """
     case = source.case
     thick = thickness(source, alpha[: case.n_design])
@@ -282,6 +289,8 @@ def _members(source: Source, alpha: Floats) -> tuple[dict[str, Any], Chosen]:
     rows: list[list[Any]] = []
     beside: list[float] = []
     belts: list[float | None] = []
+    windows: list[Any] = []
+    timed = active_windows(source.stated, alpha)
     strong = strongest(thick.shares, DRAWN)
     every = zip(case.members, thick.shares, strong, side_places(case, strong), named, strict=True)
     for group, share, chosen, side, family in every:
@@ -289,6 +298,7 @@ def _members(source: Source, alpha: Floats) -> tuple[dict[str, Any], Chosen]:
         longest = belt_lengths(case, group)
         beside += side.tolist()
         belts += [None] * len(chosen) if longest is None else _rounded(longest[chosen])
+        windows += _rounded(timed[group.name][chosen]) if group.name in timed else [None] * len(chosen)
         a, b = index[group.body_from], index[group.body_to]
         p, q = group.p_local[chosen], group.q_local[chosen]
         for k, i in enumerate(chosen.tolist()):
@@ -297,7 +307,7 @@ def _members(source: Source, alpha: Floats) -> tuple[dict[str, Any], Chosen]:
     fixed = [all(not group.design for group, each in zip(case.members, named, strict=True) if each == family)
              for family in order]  # fmt: skip
     found = {"groups": order, "fixed": fixed, "what": thick.what, "all": case.n_members,
-             "rows": rows, "beside": beside, "belts": belts}  # fmt: skip
+             "rows": rows, "beside": beside, "belts": belts, "windows": windows}  # fmt: skip
     return found, kept
 
 

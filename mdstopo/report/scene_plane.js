@@ -13,9 +13,9 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
   };
   const indexOf = (body, b) => (body.name === "ground" && b === data.bodies.length - 1 ? count : b);
 
-  const lineOf = ({ rows, belts }, k, q) => {
-    const row = rows[k];
-    return memberLine(data.hang, place(row[1], row.slice(3, 5), q), place(row[2], row.slice(5, 7), q), belts[k]);
+  const lineOf = ({ rows, belts, windows }, k, q, time) => {
+    const row = rows[k], acts = actsAt(windows[k], time);
+    return { acts, ...memberLine(data.hang, place(row[1], row.slice(3, 5), q), place(row[2], row.slice(5, 7), q), acts ? belts[k] : null) };
   };
 
   // one window for all frames of a motion, so that it stands still
@@ -23,14 +23,14 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
   const fit = (members) => {
     const low = [Infinity, Infinity], high = [-Infinity, -Infinity], inner = [], all = [];
     const m = motion(), fixed = members.fixed;
-    const frames = m ? m.q.filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
-    for (const q of frames) {
+    const frames = m ? m.q.map((q, i) => [q, m.t[i]]).filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [[data.start, null]];
+    for (const [q, time] of frames) {
       data.bodies.forEach((body, b) => {
         const index = indexOf(body, b), shape = body.areas.flat(2).concat(body.lines.flat()).map((p) => place(index, p, q));
         for (const p of shape.concat(body.arms.flat().concat(body.borders.flat(), body.points).map((p) => place(index, p, q)))) all.push(p);
         if (index < count) for (const p of shape.concat([place(index, [0, 0], q)])) { inner.push(p); all.push(p); }
       });
-      members.rows.forEach((row, k) => { for (const p of lineOf(members, k, q).line) { all.push(p); if (!fixed[row[0]]) inner.push(p); } });
+      members.rows.forEach((row, k) => { for (const p of lineOf(members, k, q, time).line) { all.push(p); if (!fixed[row[0]]) inner.push(p); } });
     }
     const seen = fixed.every((each) => each) ? all : lookedAt(inner, all, data.far);
     for (const p of seen) for (const k of [0, 1]) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
@@ -97,10 +97,10 @@ const makeScene = ({ canvas, data, motion, load, colours }) => {
     contacts(q);
     const thin = 0.6, wide = Math.max(0.8, 3.2 - 0.9 * Math.log10(Math.max(1, members.rows.length / 10)));
     members.rows.forEach((row, k) => {
-      const { line, slack } = lineOf(members, k, q), shift = members.beside[k] * (thin + wide + data.hang.free);
+      const { line, slack, acts } = lineOf(members, k, q, time), shift = members.beside[k] * (thin + wide + data.hang.free);
       g.strokeStyle = colour(row, k);
       g.globalAlpha = coloured ? 0.9 : 0.45 + 0.45 * row[SHARE];
-      strokeMember(g, data.hang, shifted(line.map(screen), shift), thin + wide * row[SHARE], slack);
+      strokeMember(g, data.hang, shifted(line.map(screen), shift), thin + wide * row[SHARE], slack, acts);
     });
     for (const symbol of symbolsAt(data, load(), time)) {
       const at = place(symbol.body, symbol.at, q), o = symbol.way && place(symbol.axes, [0, 0], q), w = symbol.way && place(symbol.axes, symbol.way, q);

@@ -49,16 +49,16 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
     return [WIDTH / 2 + camera.x + zoom * (shift[0] + scale * x), HEIGHT / 2 + camera.y + zoom * (shift[1] + scale * y), near];
   };
 
-  const lineOf = ({ rows, belts }, k, all) => {
-    const row = rows[k];
-    return memberLine(data.hang, place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)), belts[k]);
+  const lineOf = ({ rows, belts, windows }, k, all, time) => {
+    const row = rows[k], acts = actsAt(windows[k], time);
+    return { acts, ...memberLine(data.hang, place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)), acts ? belts[k] : null) };
   };
 
   // one window for all frames of a motion, so that it stands still
   const fit = (members) => {
     const m = motion(), inner = [], every = [], fixed = members.fixed;
-    const frames = m ? m.q.filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [data.start];
-    frames.forEach((q, f) => {
+    const frames = m ? m.q.map((q, i) => [q, m.t[i]]).filter((_, i) => members.rows.length < 500 || i % 8 === 0 || i === m.q.length - 1) : [[data.start, null]];
+    frames.forEach(([q, time], f) => {
       const all = seats(q);
       data.bodies.forEach((body, b) => {
         const index = indexOf(body, b), moves = index < all.length - 1;
@@ -66,7 +66,7 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
         for (const p of body.corners.concat(moves ? [[0, 0, 0]] : [])) { every.push(place(all[index], p)); if (moves) inner.push(place(all[index], p)); }
         for (const p of body.points) every.push(place(all[index], p));
       });
-      members.rows.forEach((row, k) => { for (const p of lineOf(members, k, all).line) { every.push(p); if (!fixed[row[0]]) inner.push(p); } });
+      members.rows.forEach((row, k) => { for (const p of lineOf(members, k, all, time).line) { every.push(p); if (!fixed[row[0]]) inner.push(p); } });
       for (const surface of data.surfaces) if (!surface.endless) for (const p of surface.lines.flat()) every.push(place(all[surface.body], p));
     });
     cloud = fixed.every((each) => each) ? every : lookedAt(inner, every, data.far);
@@ -152,11 +152,11 @@ const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
       for (let k = 1; k < flat.length; k++) things.push([(flat[k - 1][2] + flat[k][2]) / 2, () => line(flat[k - 1], flat[k], CONTACT, 0.8, 0.8)]);
     }
     members.rows.forEach((row, k) => {
-      const { line: corners, slack } = lineOf(members, k, all), shift = members.beside[k] * (THIN + WIDE + data.hang.free), flat = corners.map((p) => seen(p)), near = (flat[0][2] + flat[flat.length - 1][2]) / 2;
+      const { line: corners, slack, acts } = lineOf(members, k, all, time), shift = members.beside[k] * (THIN + WIDE + data.hang.free), flat = corners.map((p) => seen(p)), near = (flat[0][2] + flat[flat.length - 1][2]) / 2;
       const clear = 0.8 + 0.2 * Math.max(-1, Math.min(1, near / radius)); // what is farther is paler
       things.push([near, () => {
         g.strokeStyle = colour(row, k); g.globalAlpha = clear * (coloured ? 0.95 : 0.25 + 0.7 * row[SHARE]);
-        strokeMember(g, data.hang, shifted(flat, shift), THIN + WIDE * row[SHARE], slack);
+        strokeMember(g, data.hang, shifted(flat, shift), THIN + WIDE * row[SHARE], slack, acts);
       }]);
     });
     for (const symbol of symbolsAt(data, load(), time)) {

@@ -9,10 +9,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.plots.acting import DOTS, IDLE, NOT_ACTING, acts_in
 from mdstopo.plots.beside import sideways
 from mdstopo.plots.scenery import start_state
 from mdstopo.plots.slack import CORNERS, DASHES, DEEPEST, SLACK, THIN, belt_lengths, down, member_lines
+from mdstopo.plots.style import ink
+from mdstopo.plots.windows_of_laws import active_windows
 from mdstopo.report import report_content
 
 SCENE = Path(report_content.__file__).with_name("scene_plane.js")
@@ -87,18 +91,23 @@ Object.assign(own, {
 """
 
 
-@pytest.mark.skipif(NODE is None, reason="no node on this machine")
-def test_a_planar_scene_of_the_page_draws_slack_belts_thin_and_members_of_the_same_ends_beside_each_other() -> None:
-    case = read_case(CASE)
+def source_of(case: Case) -> SimpleNamespace:
+    """The first design of a case, of which no motion is simulated."""
     view = SimpleNamespace(
-        arrays={}, status="done", reason="", kind="simulate", warnings=(), case_text=CASE, provenance={}, settings={},
+        arrays={}, status="done", reason="", kind="simulate", warnings=(), case_text="", provenance={}, settings={},
         path=Path("none.h5"), under=lambda place: {},
     )  # fmt: skip
     still = SimpleNamespace(trajectory=lambda alpha, name: SimpleNamespace(t=np.zeros(1)))
-    source = SimpleNamespace(
-        case=case, view=view, title="belts", names=(), load_cases=("default",), engine=still,
-        alpha=np.ones(case.n_design), design=np.ones(case.n_design),
+    return SimpleNamespace(
+        case=case, stated=case, view=view, title="belts", names=(), load_cases=("default",), engine=still,
+        alpha=case.start[: case.n_design], design=case.start,
     )  # fmt: skip
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+def test_a_planar_scene_of_the_page_draws_slack_belts_thin_and_members_of_the_same_ends_beside_each_other() -> None:
+    case = read_case(CASE)
+    source = source_of(case)
     data = report_content.content(source)
     members = data["designs"][0]["members"]
     groups = [members["groups"][row[0]] for row in members["rows"]]
@@ -124,3 +133,79 @@ def test_a_planar_scene_of_the_page_draws_slack_belts_thin_and_members_of_the_sa
     apart = np.linalg.norm(np.diff(starts, axis=0), axis=2)
     assert apart == pytest.approx(np.full((3, 3), apart[0, 0]))
     assert apart[0, 0] > max(widths.values())
+
+
+#: belts that hang while they act, of which one changes its time in the design, and springs that act twice
+TIMED = (
+    CASE[: CASE.index("  slack:")]
+    + """
+  belts: {from: posts, to: {body: a, at: [1, 0]}, law: {type: gap, stiffness: 5, free_length: 4, active_until: 0.9}}
+  springs:
+    from: posts
+    to: {body: a, at: [1, 0]}
+    law: [{type: spring, stiffness: 5, active_until: 0.3}, {type: spring, stiffness: 5, active_from: 0.6}]
+  always: {from: posts, to: {body: a, at: [1, 0]}, law: {type: spring, stiffness: 5}}
+design:
+  variables: {until: {group: belts, parameter: active_until, each: member, initial: 0.5, lower: 0, upper: 1}}
+objectives: {peak: {response: {displacement: {body: a, component: x}}}}
+"""
+)
+TIMES = [0.0, 0.29, 0.3, 0.45, 0.5, 0.59, 0.6, 0.95]
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+def test_members_act_on_the_page_at_the_times_at_which_they_act_in_pictures() -> None:
+    case = read_case(TIMED)
+    design = case.start.copy()
+    design[-3:] = 0.4, 0.5, 0.6
+    source = source_of(case)
+    source.alpha, source.design = design[: case.n_design], design
+    members = report_content.content(source)["designs"][0]["members"]
+    said = in_node(f"{json.dumps(members['windows'])}.map((own) => {json.dumps(TIMES)}.map((t) => actsAt(own, t)))")
+    windows = active_windows(case, design)
+    expected = np.concatenate(
+        [acts_in(windows[group.name], np.array(TIMES)).T if group.name in windows else np.ones((3, len(TIMES)), bool)
+         for group in case.members]
+    )  # fmt: skip
+    assert members["windows"][-3:] == [None] * 3
+    assert np.array(said).tolist() == expected.tolist()
+    assert expected[:3].sum(axis=1).tolist() == [3, 4, 6]
+    assert in_node(f"{json.dumps(members['windows'])}.map((own) => actsAt(own, null))") == [True] * 9
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+@pytest.mark.parametrize("space", [False, True])
+def test_a_scene_of_the_page_draws_members_that_do_not_act_straight_thin_and_dotted_in_grey(space: bool) -> None:
+    text = TIMED
+    if space:
+        text = (
+            text.replace("[3, -9.8]", "[3, 0, -9.8]")
+            .replace("[1, 0]", "[1, 0, 0]")
+            .replace("inertia: 1", "inertia: [1, 1, 1]")
+        )
+        text = text.replace("[[0, 0], [0.2, 0.5], [0.5, 0]]", "[[0, 0, 0], [0.2, 0, 0.5], [0.5, 0, 0]]")
+        text = text.replace("format: 1", "format: 1\ndimension: 3")
+    data = report_content.content(source_of(read_case(text)))
+    script = f"""(() => {{ {PAPER} {SCENE.with_name(f"scene_{'space' if space else 'plane'}.js").read_text()}
+      const nothing = () => 0, classList = {{ add: nothing }};
+      const node = () => ({{ addEventListener: nothing, appendChild: nothing, classList, getContext: () => g }});
+      globalThis.document = {{ createElement: node }};
+      const data = {json.dumps(data)}, members = data.designs[0].members, canvas = node(), tools = node();
+      const scene = makeScene({{ canvas, tools, data, motion: () => null, load: () => "default", colours: ["#fff"] }});
+      scene.fit(members);
+      return [null, 0.1, 0.55].map((time) => {{
+        drawn.length = 0;
+        scene.draw(data.start, members, (row) => `member ${{row[0]}}`, false, time);
+        return drawn.filter((each) => String(each[3]).startsWith("member") || each[3] === data.hang.idle.colour);
+      }});
+    }})()"""
+    still, first, later = in_node(script)
+    idle = data["hang"]["idle"]
+    assert (idle["word"], idle["colour"], idle["dots"]) == (NOT_ACTING, ink("middle"), DOTS)
+    assert idle["width"] == pytest.approx(IDLE * 96.0 / 72.0)
+    assert [len(each) for each in (still, first, later)] == [9, 9, 9]
+    for shown, count in ((still, 0), (first, 0), (later, 6)):
+        grey = [(len(path), width, dash) for path, width, dash, colour in shown if colour == idle["colour"]]
+        assert grey == [(2, idle["width"], list(DOTS))] * count
+        hanging = [len(path) for path, _, dash, _ in shown if dash == list(DASHES)]
+        assert hanging == [CORNERS] * (0 if count else 3)

@@ -12,11 +12,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mdstopo.case.reader import read_case
+from mdstopo.plots.acting import NOT_ACTING
 from mdstopo.plots.scenery import ends_at, start_state
 from mdstopo.plots.solids import convex, equal_box, solid
 from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.thickness import thickness
 from mdstopo.plots.views import upright, views
+from mdstopo.plots.windows_of_laws import active_windows
 from mdstopo.report import report_content
 from mdstopo.report.gltf_motion import _sideways, motion_file
 from mdstopo.report.report_page import page
@@ -93,8 +95,8 @@ def source():
 
     motion = SimpleNamespace(t=t, q=q, v=v, at=at, status=SimpleNamespace(ok=True))
     return SimpleNamespace(
-        case=case, alpha=alpha, design=alpha, view=view, title=TITLE, names=("sway",), load_cases=("default",),
-        engine=SimpleNamespace(trajectory=lambda design, name: motion),
+        case=case, stated=case, alpha=alpha, design=alpha, view=view, title=TITLE, names=("sway",),
+        load_cases=("default",), engine=SimpleNamespace(trajectory=lambda design, name: motion),
     )  # fmt: skip
 
 
@@ -225,7 +227,7 @@ def named(source):
     eight = [group.replace("lashings", f"lashings_of_the_{way}_quarter_{k}") for k in (1, 2) for way in WAYS]
     case = read_case(CASE.replace(group, "".join(eight)).replace("body: hull, component", "body: ball, component"))
     alpha = np.linspace(0.001, 1.0, case.n_design)
-    return SimpleNamespace(**{**vars(source), "case": case, "alpha": alpha, "design": alpha})
+    return SimpleNamespace(**{**vars(source), "case": case, "stated": case, "alpha": alpha, "design": alpha})
 
 
 def inside(figure, artist) -> bool:
@@ -325,7 +327,7 @@ def test_a_long_scene_stays_in_the_view_where_it_is_turned_from_its_end(source, 
         CASE.replace("corner: [-1.5, -1.2, 0], edges: [[3, 0, 0]", "corner: [-15, -1.2, 0], edges: [[30, 0, 0]")
     )
     place = tmp_path / "long.html"
-    place.write_text(page(report_content.content(SimpleNamespace(**{**vars(source), "case": case}))))
+    place.write_text(page(report_content.content(SimpleNamespace(**{**vars(source), "case": case, "stated": case}))))
     drawn = in_node(place)["seen"]["turned from the side"]
     places = np.concatenate([each["path"] for each in drawn if each["kind"] == "area"])
     assert (places >= 0.0).all()
@@ -437,6 +439,45 @@ def test_exported_members_of_the_same_two_points_lie_beside_each_other_at_all_ti
         # from one frame to the next they turn around each other no more than the member turns
         turned = np.linalg.norm(np.diff(along, axis=0), axis=1)
         assert (np.linalg.norm(np.diff(gap[:, 0], axis=0), axis=1) <= (turned + 2e-3) * apart[0]).all()
+
+
+def test_exported_members_are_thin_and_grey_while_they_do_not_act(source):
+    start, end = (getattr(source.case.load_cases[0], name) for name in ("start", "end"))
+    until, again = start + 0.4 * (end - start), start + 0.7 * (end - start)
+    law = "{type: spring, stiffness: 800, active_until: UNTIL}, {type: spring, stiffness: 800, active_from: AGAIN}"
+    law = law.replace("UNTIL", f"{until}").replace("AGAIN", f"{again}")
+    case = read_case(CASE.replace("objectives:", f"  timed: {{from: posts, to: corners, law: [{law}]}}\nobjectives:"))
+    own = {"case": case, "alpha": np.ones(case.n_design), "design": np.ones(case.n_design)}
+    own["windows"] = active_windows(case, own["design"])
+    found = Gltf(motion_file(SimpleNamespace(**{**vars(source), **own}))[0])
+    names = [node["name"] for node in found.json["nodes"]]
+    assert sum(name.endswith(f", {NOT_ACTING}") for name in names) == len(case.members[-1])  # of no others
+    t, size = found.track(0, found.node("timed 2"), "scale")
+    _, idle_size = found.track(0, found.node(f"timed 2, {NOT_ACTING}"), "scale")
+    acts = (t + start < until) | (t + start >= again)
+    assert 20 < acts.sum() < len(t) - 20
+    assert (size > 0.0).all(axis=1).tolist() == acts.tolist()
+    assert (idle_size > 0.0).all(axis=1).tolist() == (~acts).tolist()
+    assert not size[~acts].any()
+    assert not idle_size[acts].any()
+    assert idle_size[~acts][:, 0].max() < 0.2 * size[acts][:, 0].min()
+    q = states(case, t.astype(np.float64))[0]
+    exact = np.stack([ends_at(case, case.members[-1], each)[2] for each in q])
+    lengths = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1)
+    assert (size + idle_size)[:, 1] == pytest.approx(lengths, abs=2e-4)
+    for path in ("translation", "rotation"):  # the one in the place of the other
+        first, second = (found.track(0, found.node(f"timed 2{more}"), path)[1] for more in ("", f", {NOT_ACTING}"))
+        assert np.array_equal(first, second)
+    before = found.json["nodes"][found.node(f"timed 2, {NOT_ACTING}")]
+    assert not any(before["scale"])  # before any motion every member is drawn as one that acts
+    meshes = [found.json["nodes"][found.node(name)]["mesh"] for name in ("timed 2", f"timed 2, {NOT_ACTING}")]
+    colours = [
+        found.json["materials"][found.json["meshes"][mesh]["primitives"][0]["material"]]["pbrMetallicRoughness"]
+        for mesh in meshes
+    ]
+    red, green, blue, _ = colours[1]["baseColorFactor"]
+    assert red == green == blue
+    assert colours[0] != colours[1]
 
 
 def test_exported_members_without_a_length_lie_beside_each_other_once_they_have_one():
