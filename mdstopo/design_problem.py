@@ -176,10 +176,8 @@ class DesignProblem:
                 message = f"objective {name}, which {self.scalarisation.method} needs to be positive"
                 return Sample(np.inf, status=Status.NOT_POSITIVE, message=message, info=info)
             if len(self.scalarisation.planes):
-                own, own_slopes = self.scalarisation.limits(parts)
-                first = groups.max(initial=-1) + 1
-                planes = len(self.scalarisation.planes)
-                groups = np.concatenate([groups, first + np.repeat(np.arange(planes), len(own) // planes)])
+                own, of_plane, own_slopes = self.scalarisation.limits(parts)
+                groups = np.concatenate([groups, groups.max(initial=-1) + 1 + of_plane])
                 limits = np.concatenate([limits, own])
                 slopes = np.concatenate(
                     [slopes.reshape(-1, len(self.initial)), own_slopes.reshape(-1, len(self.initial))]

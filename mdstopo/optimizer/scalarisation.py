@@ -29,7 +29,7 @@ from typing import cast
 
 import numpy as np
 
-from mdstopo.optimizer.problem import Floats
+from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.settings.scalarisations import SCALARISATIONS
 
 #: rows that one U has at most, and one plane of `nc`; choices of peaks that are all taken; the highest of more
@@ -99,30 +99,28 @@ class Scalarisation:
         """
         return _sorted(*formula_of(self.method).rows(self, parts))
 
-    def limits(self, parts: Sequence[Part]) -> tuple[Floats, Floats]:
-        """Constraint rows (C,) and gradients (C, N), feasible where <= 0; of a fixed number: the last repeated."""
-        values: list[float] = []
+    def limits(self, parts: Sequence[Part]) -> tuple[Floats, Ints, Floats]:
+        """Constraint rows (C,), feasible where <= 0, the plane (C,) that each is of, and gradients (C, N).
+
+        A plane has a row for each of the highest choices of a peak of every objective that it rises with; where it
+        falls with an objective, its highest peak alone counts.
+        """
+        rows: list[float] = []
+        of_plane: list[int] = []
         slopes: list[Floats] = []
-        for plane in self.planes:
-            # where a plane falls with an objective, its highest peak alone counts
+        factors = [self.transformed(values, i)[1] for i, (values, _) in enumerate(parts)]
+        for k, plane in enumerate(self.planes):
             shares = [
-                n * self.transformed(part[0] if n > 0.0 else part[0][:1], i)[0]
-                for i, (n, part) in enumerate(zip(plane, parts, strict=True))
+                n * self.transformed(values if n > 0.0 else values[:1], i)[0]
+                for i, (n, (values, _)) in enumerate(zip(plane, parts, strict=True))
             ]
-            found = []
             for choice in highest_choices(shares, LIMITS):
-                total, slope = 0.0, np.zeros(parts[0][1].shape[1])
-                for i, p in enumerate(choice):
-                    g, factor = self.transformed(parts[i][0][p : p + 1], i)
-                    total += plane[i] * (float(g[0]) - self.anchor[i])
-                    if len(parts[i][1]):
-                        slope = slope + plane[i] * factor * parts[i][1][p]
-                found.append((total, slope))
-            found.sort(key=lambda each: -each[0])
-            found += [found[-1]] * (LIMITS - len(found))
-            values += [each[0] for each in found]
-            slopes += [each[1] for each in found]
-        return np.array(values), np.array(slopes).reshape(len(values), parts[0][1].shape[1])
+                rows.append(float(sum(share[p] for share, p in zip(shares, choice, strict=True)) - plane @ self.anchor))
+                of_plane.append(k)
+                if all(len(part[1]) for part in parts):
+                    every = zip(plane, factors, parts, choice, strict=True)
+                    slopes.append(sum(n * factor * part[1][p] for n, factor, part, p in every))
+        return np.array(rows), np.array(of_plane, dtype=np.int64), np.array(slopes).reshape(-1, parts[0][1].shape[1])
 
 
 class Formula(ABC):
