@@ -205,6 +205,12 @@ class Case(Value):
         return sum(len(group) for group in self.design_groups)
 
     @property
+    def objectives_that_count(self) -> tuple[Objective, ...]:
+        """The objectives that a run follows; those of weight 0 are only told."""
+        weights = self.combine.weights if self.combine is not None else {}
+        return tuple(each for each in self.objectives if weights.get(each.name, 1.0) > 0.0)
+
+    @property
     def n_members(self) -> int:
         """The number of members of all groups, designed or not."""
         return sum(len(group) for group in self.members)

@@ -244,13 +244,10 @@ def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...
 
     None about objectives of weight 0, which a run only tells.
     """
-    weights = case.combine.weights if case.combine is not None else {}
     if not columns or not all(columns[k].evaluation.status.usable for k in (0, -1)):
         return ()
     told = []
-    for objective in case.objectives:
-        if weights.get(objective.name, 1.0) == 0.0:
-            continue
+    for objective in case.objectives_that_count:
         before, now = (columns[k].evaluation.objectives[objective.name] for k in (0, -1))
         loss = (before - now if objective.sense == "maximize" else now - before) / abs(before) if before else 0.0
         if loss > WORSE:

@@ -61,12 +61,11 @@ def without_slope(case: Case, found: Evaluation) -> tuple[str, ...]:
     something, a pendulum that swings from one side to the other whatever holds it, or a response that `constant_load`
     holds.
     """
-    weights = case.combine.weights if case.combine is not None else {}
     told = []
-    for objective in case.objectives:
+    for objective in case.objectives_that_count:
         name = objective.name
         value = found.objectives.get(name, 0.0)
-        if found.gradients.get(name) is None or value == 0.0 or weights.get(name, 1.0) == 0.0:
+        if found.gradients.get(name) is None or value == 0.0:
             continue
         if _largest_change(case, found, name) > _ROUNDING * abs(value):
             continue
@@ -113,8 +112,7 @@ def is_held(case: Case, load_case: str) -> bool:
 
 def _minimised(case: Case) -> list[Objective]:
     """The objectives that are made small and count."""
-    weights = case.combine.weights if case.combine is not None else {}
-    return [each for each in case.objectives if each.sense == "minimize" and weights.get(each.name, 1.0) > 0.0]
+    return [each for each in case.objectives_that_count if each.sense == "minimize"]
 
 
 def relative_motion(case: Case, motion: Motion) -> float:
