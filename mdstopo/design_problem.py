@@ -107,6 +107,7 @@ class DesignProblem:
         few, many = Rows(*NEAR, cones=cones), Rows(*ALL, cones=cones)
         #: the peaks that an evaluation is asked for
         self.rows = (many if members else few) if self.competes else USUAL
+        #: how many of them the last design needed: the next evaluation begins with these, and tells the same as if not
         self._enough: int | None = None
         fixed = [row for i, row in enumerate(case.constraints) if isinstance(row, VolumeRow) and i not in moving]
         self.linear = _linear_rows(fixed, self.space)
@@ -196,17 +197,21 @@ class DesignProblem:
         few, room = self.rows.most, min(MOST_ROWS, ROOM / len(self.initial))
         if not gradient or few is None:
             return self._evaluator.evaluate(design, gradient, rows=self.rows)
+
+        def evaluated(most: int) -> Evaluation:
+            return self._evaluator.evaluate(design, gradient, rows=self.rows._replace(most=most))
+
         most = self._enough or few
-        evaluation = self._evaluator.evaluate(design, gradient, rows=self.rows._replace(most=most))
+        evaluation = evaluated(most)
         needed = few
         while needed < most and _is_cut_off(evaluation, needed):
             needed *= GROWTH
         if needed < most:
             most = needed
-            evaluation = self._evaluator.evaluate(design, gradient, rows=self.rows._replace(most=most))
+            evaluation = evaluated(most)
         while _is_cut_off(evaluation, most) and GROWTH * most <= room:
             most *= GROWTH
-            evaluation = self._evaluator.evaluate(design, gradient, rows=self.rows._replace(most=most))
+            evaluation = evaluated(most)
         self._enough = most
         return evaluation
 
@@ -334,7 +339,7 @@ class Cones(NamedTuple):
 
 
 def _is_cut_off(evaluation: Evaluation, most: int) -> bool:
-    """Whether of so many peaks of anything, which were told, the last is near the largest."""
+    """Whether a response or a constraint has so many peaks, of which the last is still near the largest."""
     if evaluation.all_compete or not evaluation.status.usable:
         return False
     told = [*evaluation.peaks.values(), *evaluation.constraint_peaks.values()]

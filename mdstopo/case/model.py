@@ -206,7 +206,7 @@ class Case(Value):
 
     @property
     def objectives_that_count(self) -> tuple[Objective, ...]:
-        """The objectives that a run follows; those of weight 0 are only told."""
+        """The objectives that a run lowers or raises; those of weight 0 are only reported."""
         weights = self.combine.weights if self.combine is not None else {}
         return tuple(each for each in self.objectives if weights.get(each.name, 1.0) > 0.0)
 

@@ -210,7 +210,7 @@ def finalize(
     text, difference = "", None
     source, sized = reduced, now
     sizes_are_left = not count or bool(np.any(now[:count] ** reduced.power > 0.0))
-    if found.status.usable and (sizes_are_left or _chooses_of_what_is_given(reduced)):
+    if found.status.usable and (sizes_are_left or _has_variables_of_fixed_members(reduced)):
         content, told = final_content(content_of(case), reduced, own, now)
         text = head(int(np.count_nonzero(now[:count] ** reduced.power > 0.0))) + text_of(content)
         final = _read(text, place)
@@ -233,16 +233,16 @@ def finalize(
     return made(columns, words, text, told, difference)
 
 
-def _chooses_of_what_is_given(case: Case) -> bool:
-    """Whether a variable is a parameter of members that are no design variables, which stay whatever sizes become."""
-    given = {group.name for group in case.members if not group.design}
-    return any(given & set(variable.groups) for variable in case.variables)
+def _has_variables_of_fixed_members(case: Case) -> bool:
+    """Whether a variable is a parameter of members whose sizes are no design variables, which are always written."""
+    fixed = {group.name for group in case.members if not group.design}
+    return any(fixed & set(variable.groups) for variable in case.variables)
 
 
 def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...]:
     """Sentences about objectives that are more than `WORSE` worse in the last column than in the first.
 
-    None about objectives of weight 0, which a run only tells.
+    None about objectives of weight 0, which a run only reports.
     """
     if not columns or not all(columns[k].evaluation.status.usable for k in (0, -1)):
         return ()

@@ -22,7 +22,7 @@ from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.conic import Program, Solution, solve
 from mdstopo.optimizer.curvature import FEW, Curvature, learnt
 from mdstopo.optimizer.nearest_feasible import repair
-from mdstopo.optimizer.problem import Floats, Ints, LinearRows, largest_of_groups
+from mdstopo.optimizer.problem import Bools, Floats, Ints, LinearRows, largest_of_groups
 from mdstopo.optimizer.stack import Slopes, Stack, joined
 
 #: what violations cost, in multipliers of their limits: more than one, or the merit would be least where limits are
@@ -264,8 +264,9 @@ def rows_to_compare(bundle: Bundle, multipliers: Floats, smooth: bool) -> tuple[
     no gradient at the iterate; their multipliers count for the own ones of their group.
     """
     groups = int(bundle.group.max(initial=0)) + 1
-    only = smooth & bundle.own & (bundle.group == 0)
-    carried = np.where(only, 1.0, multipliers) if only.sum() == 1 else multipliers
+    carried = multipliers
+    if smooth and _own_objective_rows(bundle).sum() == 1:
+        carried = np.where(_own_objective_rows(bundle), 1.0, multipliers)
     own = np.flatnonzero(bundle.own & (carried > 0.0))
     total = np.bincount(bundle.group, weights=multipliers, minlength=groups)
     mine = np.bincount(bundle.group[own], weights=carried[own], minlength=groups)
@@ -275,8 +276,14 @@ def rows_to_compare(bundle: Bundle, multipliers: Floats, smooth: bool) -> tuple[
 
 def is_only_row(bundle: Bundle, new: Bundle, k: int, smooth: bool) -> bool:
     """Whether row k of the iterate is the only one of a smooth objective, and so the same as the trial's only one."""
-    only = int((bundle.own & (bundle.group == 0)).sum()) == int((new.group == 0).sum()) == 1
+    only = int(_own_objective_rows(bundle).sum()) == int((new.group == 0).sum()) == 1
     return smooth and bundle.group[k] == 0 and only
+
+
+def _own_objective_rows(bundle: Bundle) -> Bools:
+    """(K,) which rows are the objective's at the iterate itself."""
+    found: Bools = bundle.own & (bundle.group == 0)
+    return found
 
 
 def lower_bound(rows: Bundle, trial: Trial, x: Floats, space: FeasibleSet, penalty: Floats) -> float:
