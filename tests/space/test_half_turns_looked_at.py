@@ -62,9 +62,30 @@ def test_room_grows_as_far_as_memory_goes(monkeypatch) -> None:
     driver = evaluator_of(load("springs")).driver("default")
     before = len(driver.room)
     monkeypatch.setattr("mdstopo.case.memory.most_floats", lambda: int(1.5 * before))
-    assert driver._grow()
+    assert driver._grow(True)
     assert 1.4 * before < len(driver.room) <= 1.5 * before
-    assert not driver._grow()
+    assert not driver._grow(True)
+
+
+def test_a_motion_without_gradients_needs_no_room_for_what_only_these_need(monkeypatch) -> None:
+    from mdstopo.engine import Evaluator
+
+    case = mdstopo.load_case(CASES / "springs.yaml", overrides={"time.end": 20, "solver.integrator": "runge_kutta"})
+    ample = Evaluator(case).evaluate(case.initial)
+    evaluator = Evaluator(case)
+    driver = evaluator.driver("default")
+    most = 10 * len(driver.room)
+    monkeypatch.setattr("mdstopo.case.memory.most_floats", lambda: most)
+    monkeypatch.setattr("mdstopo.general.driver.general_driver.SMALL", 0)
+    assert evaluator.evaluate(case.initial).status is Status.STEP_LIMIT
+    alone = evaluator.evaluate(case.initial, gradient=False)
+    assert alone.objectives == ample.objectives
+    assert len(driver.room) <= most
+    assert evaluator.evaluate(case.initial).status is Status.STEP_LIMIT
+    monkeypatch.undo()
+    again = evaluator.evaluate(case.initial)
+    assert again.objectives == ample.objectives
+    assert np.array_equal(again.gradients["sway"], ample.gradients["sway"])
 
 
 def test_a_method_without_an_error_estimate_says_why_and_the_others_are_shown(monkeypatch) -> None:

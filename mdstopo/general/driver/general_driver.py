@@ -50,7 +50,7 @@ from mdstopo.general.scene.compile_general import GeneralScene, compile_general
 from mdstopo.general.scene.dimension import dimension_of
 from mdstopo.general.scene.further_times import landed
 from mdstopo.general.scene.variables import Placing
-from mdstopo.general.steps.step_history import FACTORS, GRAZES, POSES, WINDOWS, history_room
+from mdstopo.general.steps.step_history import FACTORS, GRAZES, KEPT, NOTHING, POSES, TANGENTS, WINDOWS, history_room
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
 from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult
 from mdstopo.integrators.steps import (
@@ -81,6 +81,9 @@ DAMPING = 1
 #: `_plain_arguments` `count` and `window`
 TANGENT_AT = 4
 COUNT_AT, WINDOW_AT = 6, 11
+#: numbers in the arrays for steps (128 MB) from which on these grow without what only gradients need, where none are
+#: wanted
+SMALL = 2**24
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -161,7 +164,7 @@ class GeneralDriver:
         self._entry: Entries | None = None
         self._message = ""
         self._allowed = MAX_STEPS
-        self._make_room(method.steps, method.stages, 64)
+        self._make_room(method.steps, method.stages, 64, self._kept_for_gradients)
         if options.fits:
             self._fit()
         #: at rest, where the case asks for it
@@ -217,25 +220,40 @@ class GeneralDriver:
         """Limit the number of steps of a run; one that needs more ends with STEP_LIMIT."""
         self._allowed = self.limits[0] = steps
 
-    def _make_room(self, steps: int, stages: int, events: int) -> None:
-        # the reverse sweep uses a stage's factors again where it is explicit and the mass is diagonal
-        kept = FACTORS if self.method.kind.explicit and not self._inertial else 0
-        if kept == FACTORS and self._keeps_poses:
-            kept = POSES
+    @property
+    def _kept_for_gradients(self) -> int:
+        """What is kept of a stage beside its state where gradients may be wanted (`step_history`)."""
         if self.method.collocates:
-            kept = WINDOWS
+            return WINDOWS
+        # the reverse sweep uses a stage's factors again where it is explicit and the mass is diagonal
+        if not self.method.kind.explicit or self._inertial:
+            return TANGENTS
+        return POSES if self._keeps_poses else FACTORS
+
+    def _make_room(self, steps: int, stages: int, events: int, kept: int) -> None:
         self.limits = np.array([self._allowed, steps, stages, events, self._inertial, kept], dtype=np.int64)
         floats, ints = history_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
         self.ready = Ready()  # prepared calls hold the arrays of before
 
-    def _grow(self) -> bool:
-        """Make twice the room, or as much as memory has; False where that is hardly more."""
-        factor = room_factor(len(self.room))
+    def _make_room_for_tangents(self) -> None:
+        """Room for what gradients need, where that of before has grown without."""
+        if self.limits[KEPT] == NOTHING:
+            self._make_room(self.method.steps, self.method.stages, 64, self._kept_for_gradients)
+
+    def _grow(self, tangent: bool) -> bool:
+        """Make twice the room, or as much as memory has; False where that is hardly more.
+
+        tangent: whether gradients are wanted. Where they are not, what they need takes no more room: it is most of it.
+        """
+        explicit = self.method.kind.explicit
+        kept = NOTHING if explicit and not tangent and len(self.room) > SMALL else int(self.limits[KEPT])
+        factor = 2.0 if kept != self.limits[KEPT] else room_factor(len(self.room))
         if factor == 1.0:
             return False
-        self._make_room(*(int(factor * int(size)) for size in self.limits[1:4]))
+        steps, stages, events = (int(factor * int(size)) for size in self.limits[1:4])
+        self._make_room(steps, stages, events, kept)
         return True
 
     def _full(self, count: int, time: float) -> str:
@@ -701,6 +719,8 @@ class GeneralDriver:
         self.ints, self.floats = (
             self.pack(landed(self.with_start(), quadrature_breakpoints)) if quadrature_breakpoints else self._packed
         )
+        if tangent:
+            self._make_room_for_tangents()
         while True:
             self.work.fill(0)
             code, count, self.events, time = self.ready.often(
@@ -712,7 +732,7 @@ class GeneralDriver:
                 self.count = count
                 self._message = why_it_ended(self, code, time)
                 return code, count, time
-            if not self._grow():
+            if not self._grow(tangent):
                 self._message = self._full(count, time)
                 return STEP_LIMIT, count, time
 

@@ -21,9 +21,11 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES, GIVEN = range(6)
-#: what is kept of a stage beside: nothing, the factors of the joints' matrix, rows of `window`, or factors with what K
-#: of pairs follows from in the place of K
-FACTORS, WINDOWS, POSES = 1, 2, 3
+#: what is kept of a stage beside its state: tangents, these and the factors of the joints' matrix, tangents and rows of
+#: `window`, factors with what K of pairs follows from in the place of K, or nothing, where no gradient is wanted
+TANGENTS, FACTORS, WINDOWS, POSES, NOTHING = 0, 1, 2, 3, 4
+#: where `limits` have it
+KEPT = 5
 #: rows of `window`: coefficients of the window's polynomial; x, y, u of its node (`kinematics_interface`)
 COEFFICIENT, X, Y, U = range(4)
 #: columns of `kept`
@@ -49,7 +51,7 @@ SIZES = {
     "pose": "model.size[7]",
     "of_sums": "(both // 2 + 1) ** 2",
     "factored": "stages if limits[5] == 1 or limits[5] == 3 else 1",
-    "formed": "stages if limits[5] != 3 else 1",
+    "formed": "stages if limits[5] < 3 else 1",
     "posed": "stages if limits[5] == 3 else 1",
     "collocated": "stages if limits[5] == 2 else 1",
 }
@@ -151,7 +153,7 @@ def carve_history(model, limits, floats, ints):
     """A `StepHistory` over flat arrays.
 
     model: the compiled scene. limits (6,): steps allowed, room for steps, stages, events, whether there are inerters,
-    what is kept of a stage beside (FACTORS, WINDOWS, POSES). floats, ints: as long as `history_room` says.
+    what is kept of a stage beside (TANGENTS to NOTHING). floats, ints: as long as `history_room` says.
     """
 
 
