@@ -310,7 +310,7 @@ def _sizes(chosen: "ChosenSizes") -> list[tuple[str, str]]:
     ]
     how = "all evaluated" if chosen.exhaustive else f"{chosen.nodes} nodes"
     found = (
-        f"{chosen.members} members kept, {count_text(chosen.choices)} choices; {how}, {chosen.evaluations} evaluations"
+        f"{chosen.members} members, {count_text(chosen.choices)} choices; {how}, {chosen.evaluations} evaluations"
     )
     lines.append(("  choice", found + ("; found beside the best of the nodes" if chosen.exchanged else "")))
     if chosen.sizes:

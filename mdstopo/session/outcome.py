@@ -65,7 +65,7 @@ class Progress:
 class ChosenSizes:
     """What is known of the choice of sizes from a catalogue.
 
-    members: how many are kept, whose sizes are chosen; choices: how many there are of these. objective: raw value of
+    members: how many there are whose sizes are chosen; choices: how many of these there are. objective: raw value of
     the best choice; continuous: that of the optimum before. bound: the best optimum of a relaxation that is still open,
     or the objective where none is; of a problem with several optima it is no proven bound. nodes, evaluations: so far.
     exhaustive: whether all choices were evaluated; exchanged: whether a neighbour of the best of all nodes was better

@@ -1,7 +1,8 @@
 """The last stage of a run whose case has a catalogue: the sizes of the members that are kept (`size_search`)."""
 
+import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -17,8 +18,9 @@ from mdstopo.optimizer.interface import run as run_optimizer
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.state import State
 from mdstopo.scene.moving_volumes import moves, moving_volumes, spent
+from mdstopo.session import size_search
 from mdstopo.session.outcome import ChosenSizes
-from mdstopo.session.size_search import MOST_EVALUATIONS, Catalogued, SearchProgress, SizeSearch, Within, progress_in
+from mdstopo.session.size_search import Catalogued, Ints, SearchProgress, SizeSearch, Within, progress_in
 from mdstopo.session.start_in_stages import STAGE, Marked, continued, has_sizes
 from mdstopo.starts.single_start import make_optimizer
 from mdstopo.status import RunStatus
@@ -32,8 +34,10 @@ Floats = NDArray[np.float64]
 CATALOGUE, SEARCH = "catalogue", "catalogue/search"
 #: members with less than this share of the least size above 0 are not kept
 KEPT = 0.5
-#: a choice that is worse than the continuous optimum by more than this share tells how many members had no part in it
+#: where the best choice for the members kept is worse than the continuous optimum by more than this share, so many of
+#: the others are allowed sizes, too
 MUCH_WORSE = 0.05
+OTHERS = 12
 #: seconds between two lines on how far the choice is
 SAID_EVERY = 10.0
 
@@ -49,8 +53,10 @@ class Sizes:
         self._search: SizeSearch | None = None
         self._before: ResultView | None = None
         self._continuous = float("nan")
-        self._kept = 0
-        #: evaluations of a search before, which has found nothing
+        #: members with a catalogue, and those whose sizes are chosen
+        self._all = sum(len(group) for group in case.design_groups if group.sizes)
+        self._members = 0
+        #: evaluations of the first search, where there is a second one, with more members
         self._spent = 0
 
     def refuse(self) -> None:
@@ -80,9 +86,9 @@ class Sizes:
             return
         with _whole(view):
             arrays = view.under(SEARCH)
-            progress, catalogued = progress_in(arrays), self._catalogued(arrays["place"].tolist())
+            progress, catalogued = progress_in(arrays), self._catalogued(arrays["place"].astype(np.int64))
             self._continuous = self._sign * float(view.array(f"{CATALOGUE}/continuous"))
-        self._kept = len(catalogued.place)
+        self._members = self._count(catalogued.place)
         self.outcome = self._outcome(progress, catalogued)
 
     def is_chosen(self, state: State) -> bool:
@@ -106,50 +112,60 @@ class Sizes:
         notify: is given sentences for the user.
         """
         self._continuous = float(state.best_objective)
-        everyone = self._was_everyone()
-        progress = self._searched(problem, state, everyone, stop, keep, notify)
-        everybody = len(self._groups_at())
-        # where no member is kept, the continuous optimum is far below every size, and says nothing about their choice
-        if progress.finished and progress.x is None and 0 < self._kept < everybody and not everyone:
-            before = f"no sizes of the {self._kept} kept keep the constraints"
-            notify(f"{before}: now sizes of all {count_text(everybody)} are chosen")
-            self._before, self._spent = None, progress.evaluations  # the next search is another one
-            progress = self._searched(problem, state, True, stop, keep, notify)
+        x, hooks = state.best_alpha, (stop, keep, notify)
+        if self._spent:  # an earlier process has come to the second search
+            progress = self._searched(problem, x, self._place_before(), *hooks, second=True)
+        else:
+            kept = self._kept(problem, x)
+            progress = self._searched(problem, x, kept, *hooks)
+            if progress.finished and len(more := self._more(problem, x, kept, progress)) > len(kept):
+                fails = f"no sizes of the {self._members} kept keep the constraints"
+                poor = f"the best choice for the {self._members} kept is {self._worse(progress):.1%} worse"
+                also = count_text(self._count(more))
+                notify(f"{fails if progress.x is None else poor}: now sizes of {also} members are chosen")
+                self._before, self._spent = None, progress.evaluations  # the next search is another one
+                progress = self._searched(problem, x, more, *hooks, second=True, known=progress)
         if (not progress.finished and stop()) or progress.x is None:
             return state
         return self._end(problem, state, progress.x, progress)
 
-    def _was_everyone(self) -> bool:
-        """Whether an earlier process has come to choose sizes of all members."""
-        if self._before is None:
-            return False
+    def _place_before(self) -> Ints:
+        """The variables whose sizes an earlier process has searched (k,)."""
+        assert self._before is not None
         with _whole(self._before):
-            return len(self._before.under(SEARCH)["place"]) == len(self._groups_at())
+            return self._before.under(SEARCH)["place"].astype(np.int64)
 
     def _searched(
         self,
         problem: Problem,
-        state: State,
-        everyone: bool,
+        x: Floats,
+        place: Ints,
         stop: Callable[[], bool],
         keep: Callable[[], None],
         notify: Callable[[str], None],
+        second: bool = False,
+        known: SearchProgress | None = None,
     ) -> SearchProgress:
-        """Search for sizes of the members that are kept; how far it has come.
+        """Search for sizes of some members; how far it has come.
 
-        problem: that of the last stage. state: the continuous optimum.
-        everyone: whether all members are kept.
+        problem: that of the last stage.
+        x (n,): the continuous optimum.
+        place (k,): the variables whose sizes are chosen; all others have their least size.
         stop, keep, notify: as of `choose`.
+        second: whether a search for fewer of them came before; known: what it has found.
         """
-        held, catalogued = self._held(problem, state.best_alpha, everyone)
-        self._kept = len(catalogued.place)
-        search = SizeSearch(held, catalogued, held.initial, self._solve, self.case.optimizer.tolerance)
+        held, catalogued = self._held(problem, x, place)
+        self._members = self._count(place)
+        few = size_search.MANY if second else size_search.FEW
+        search = SizeSearch(held, catalogued, held.initial, self._solve, self.case.optimizer.tolerance, few)
         self._search = search
+        if known is not None and known.x is not None:
+            search.know(known.x, known.objective)
         if self._before is not None:
             with _whole(self._before):
                 search.restore(self._before.under(SEARCH))
-        of = count_text(sum(len(group) for group in self.case.design_groups if group.sizes))
-        notify(f"choosing sizes of {self._kept} members of {of}, {count_text(catalogued.choices)} choices")
+        of = count_text(self._all)
+        notify(f"choosing sizes of {self._members} members of {of}, {count_text(catalogued.choices)} choices")
         said_at = time.monotonic()
 
         def save(progress: SearchProgress) -> None:
@@ -194,7 +210,7 @@ class Sizes:
         """How the run ends where no sizes have been chosen; None where they have, or were not asked for."""
         if not self.asked or self.is_chosen(state) or self.outcome is None:
             return None
-        ended = self.outcome.finished or self.outcome.evaluations - self._spent >= MOST_EVALUATIONS
+        ended = self.outcome.finished or self.outcome.evaluations - self._spent >= size_search.MOST_EVALUATIONS
         if ended and not self.outcome.sizes:
             what = "keeps the constraints" if self.outcome.finished else f"was found in {self.outcome.nodes} nodes"
             if not self.outcome.members:
@@ -233,43 +249,82 @@ class Sizes:
         """-1 where the objective is to be maximised, and so U is its negative."""
         return -1.0 if self.case.objectives[0].sense == "maximize" else 1.0
 
-    def _held(self, problem: Problem, x: Floats, everyone: bool) -> tuple[Within, Catalogued]:
-        """The problem with members that are not kept at their least size and its price, and the variables of the
-        others. everyone: whether all members are kept."""
+    def _kept(self, problem: Problem, x: Floats) -> Ints:
+        """The variables of the members that are kept, by their places in x (k,): those with half of their least size in
+        the continuous optimum x (n,). Where that is some, and all choices are so few that each is evaluated: all."""
+        groups = self._groups_at()
+        least = {place: next((size for size in group.sizes if size > 0.0), math.inf) for place, group in groups.items()}
+        kept = [place for place in groups if x[place] >= KEPT * least[place]]
+        free = np.flatnonzero(problem.upper > problem.lower)
+        few = math.prod(len(group.sizes) for group in groups.values()) <= size_search.FEW and set(free.tolist()) <= set(
+            groups
+        )
+        return np.array(sorted(groups if kept and few else kept), dtype=np.int64)
+
+    def _more(self, problem: Problem, x: Floats, kept: Ints, progress: SearchProgress) -> Ints:
+        """The variables whose sizes are chosen behind a search for those of members kept, by their places in x (k,).
+
+        All where no choice keeps the constraints. Where the best choice is much worse than the continuous optimum x
+        (n,), some others: those with which the objective falls most for what their first size above the least costs,
+        to first order. The same ones where nothing more is to be searched.
+        """
+        groups = self._groups_at()
+        # where no member is kept, the continuous optimum is far below every size, and says nothing about their choice
+        if not len(kept) or (progress.x is not None and self._worse(progress) <= MUCH_WORSE):
+            return kept
+        others = [at for at in sorted(groups) if at not in set(kept.tolist()) and len(groups[at].sizes) > 1]
+        if progress.x is not None and len(others) > OTHERS:
+            slope, weight = problem.evaluate(x).gradients[0], np.abs(problem.linear.A).max(axis=0, initial=0.0)
+
+            def gain(at: int) -> float:
+                sizes, prices = groups[at].sizes, groups[at].prices
+                cost = weight[at] * (prices[1] - prices[0])
+                return float(slope[at] * (sizes[1] - sizes[0]) / (cost if cost > 0.0 else 1.0))
+
+            others = sorted(others, key=gain)[:OTHERS]
+        return np.array(sorted([*kept.tolist(), *others]), dtype=np.int64)
+
+    def _held(self, problem: Problem, x: Floats, place: Ints) -> tuple[Within, Catalogued]:
+        """The problem from the design x (n,) on, with members at their least size and its price unless their variables
+        are at `place` (k,), and those variables."""
         lower, upper, begin = problem.lower.copy(), problem.upper.copy(), x.copy()
         # rows have the sizes of members that are held: what their prices are above these is spent before
         rows, dearer = problem.linear, np.zeros(len(x))
-        kept = []
-        for place, group in self._groups_at().items():
-            least = next((size for size in group.sizes if size > 0.0), np.inf)  # none: all are 0, and no member is kept
-            if not everyone and x[place] < KEPT * least:
-                lower[place] = upper[place] = begin[place] = group.sizes[0]
-                dearer[place] = group.prices[0] - group.sizes[0]
-            else:
-                kept.append(place)
+        for at, group in self._groups_at().items():
+            if at not in set(place.tolist()):
+                lower[at] = upper[at] = begin[at] = group.sizes[0]
+                dearer[at] = group.prices[0] - group.sizes[0]
         held = Within(problem, [0], lower, upper, replace(rows, b=rows.b - rows.A @ dearer))
         held.initial = begin
-        return held, self._catalogued(sorted(kept))
+        return held, self._catalogued(place)
+
+    def _places(self, group: MemberGroup) -> Ints:
+        """Where in x the alpha of each member of a group is."""
+        space = self.case.space
+        # seen by expanding the places
+        places = space.expand(np.arange(space.size, dtype=np.float64))[: space.n_alpha].astype(np.int64)
+        return np.asarray(places[self.case.group_slices[group.name]])
 
     def _groups_at(self) -> dict[int, MemberGroup]:
         """Of each variable with a catalogue, by its place in x: a group that it is of."""
-        space = self.case.space
-        # alpha i is x[slot i]: seen by expanding the places
-        slots = space.expand(np.arange(space.size, dtype=np.float64))[: space.n_alpha].astype(np.int64)
         return {
             place: group
             for group in self.case.design_groups
             if group.sizes
-            for place in np.unique(slots[self.case.group_slices[group.name]]).tolist()
+            for place in np.unique(self._places(group)).tolist()
         }
 
-    def _catalogued(self, places: Sequence[int]) -> Catalogued:
-        """Variables with their sizes and prices. places: in x."""
-        groups = self._groups_at()
+    def _count(self, place: Ints) -> int:
+        """How many members have their alphas at these places in x (k,)."""
+        return sum(int(np.isin(self._places(group), place).sum()) for group in self.case.design_groups if group.sizes)
+
+    def _catalogued(self, place: Ints) -> Catalogued:
+        """Variables with their sizes and prices. place (k,): in x."""
+        groups = [self._groups_at()[at] for at in place.tolist()]
         return Catalogued(
-            np.array(places, dtype=np.int64),
-            tuple(np.array(groups[place].sizes) for place in places),
-            tuple(np.array(groups[place].prices) for place in places),
+            place,
+            tuple(np.array(group.sizes) for group in groups),
+            tuple(np.array(group.prices) for group in groups),
         )
 
     def _solve(self, problem: Problem, x: Floats) -> State:
@@ -287,26 +342,29 @@ class Sizes:
                         size: int(np.count_nonzero(np.abs(own - size) <= 1e-12)) for size in group.sizes
                     }
         return ChosenSizes(
-            members=self._kept, choices=catalogued.choices, objective=sign * progress.objective,
+            members=self._members, choices=catalogued.choices, objective=sign * progress.objective,
             continuous=sign * self._continuous, bound=sign * progress.bound, nodes=progress.nodes,
             evaluations=self._spent + progress.evaluations, exhaustive=progress.exhaustive,
             exchanged=progress.exchanged, finished=progress.finished, sizes=chosen,
         )  # fmt: skip
 
+    def _worse(self, progress: SearchProgress) -> float:
+        """By what share of it the best choice is worse than the continuous optimum."""
+        return (progress.objective - self._continuous) / (abs(self._continuous) or 1.0)
+
     def _reason(self, progress: SearchProgress) -> str:
+        left = self._all - self._members
         if progress.exhaustive:
-            how = "the best of all choices for the members kept"
+            how = "the best of all choices for the members kept" if left else "the best of all choices"
         elif progress.finished:
             how = f"no one of {progress.nodes} nodes has a better relaxation"
         else:
             how = f"the best of {progress.nodes} nodes, after which the search ends"
-        size = abs(self._continuous) or 1.0
-        worse = (progress.objective - self._continuous) / size
-        others = len(self._groups_at()) - self._kept
-        left = "other member was left at its" if others == 1 else f"{others} other members were left at their"
-        apart = f"; the {left} least size, of which no choice was tried" if others else ""
+        worse = self._worse(progress)
+        were = "other member was left at its" if left == 1 else "other members were left at their"
+        apart = f"; the {left} {were} least size, of which no choice was tried" if left else ""
         return (
-            f"sizes of {self._kept} members chosen: {how}, {self._spent + progress.evaluations} evaluations; "
+            f"sizes of {self._members} members chosen: {how}, {self._spent + progress.evaluations} evaluations; "
             f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
             f"{apart if worse > MUCH_WORSE else ''}"
         )

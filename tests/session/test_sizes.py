@@ -47,10 +47,9 @@ def case_with(sizes, **changes):
     return read_case(text)
 
 
-def brute(case, outcome, sizes, paid=None):
-    """The best of all choices for the members that were kept, the others at the least size."""
+def brute(case, sizes, kept, paid=None):
+    """The best of all choices for some members, the others at the least size."""
     price = dict(zip(sizes, sizes if paid is None else paid, strict=True))
-    kept = kept_of(outcome, sizes)
     evaluator, best, at = Evaluator(case), np.inf, None
     for choice in itertools.product(sizes, repeat=len(kept)):
         design = np.full(case.n_design, sizes[0])
@@ -71,7 +70,6 @@ def kept_of(outcome, sizes):
     """Members with half of the least size above 0, or more, in the continuous optimum."""
     continuous = run_session(replace(outcome.case, members=tuple(replace(g, sizes=()) for g in outcome.case.members)))
     kept = np.flatnonzero(continuous.alpha >= 0.5 * min(size for size in sizes if size))
-    assert len(kept) == outcome.sizes.members
     assert continuous.objectives["G"] == pytest.approx(outcome.sizes.continuous, rel=1e-12)
     return kept
 
@@ -81,7 +79,9 @@ def test_the_sizes_of_a_run_are_the_best_of_all_choices(few, tmp_path, monkeypat
     monkeypatch.setattr("mdstopo.session.size_search.FEW", few)
     case = case_with("[0, 0.4, 1]")
     outcome = run_session(case, path=tmp_path / "r.h5")
-    best, at = brute(case, outcome, [0.0, 0.4, 1.0])
+    kept = kept_of(outcome, [0.0, 0.4, 1.0])
+    assert len(kept) == outcome.sizes.members == 5
+    best, at = brute(case, [0.0, 0.4, 1.0], kept)
     assert outcome.status is RunStatus.CONVERGED
     assert outcome.objectives["G"] == pytest.approx(best, rel=1e-9)
     assert outcome.alpha.tolist() == at
@@ -96,21 +96,49 @@ def test_the_sizes_of_a_run_are_the_best_of_all_choices(few, tmp_path, monkeypat
     assert view.array("catalogue/continuous") == outcome.sizes.continuous
 
 
-def test_a_poor_choice_tells_that_members_that_are_not_kept_had_no_part_in_it():
-    outcome = run_session(case_with("[0, 1]"))
-    assert outcome.objectives["G"] > 1.05 * outcome.sizes.continuous
-    assert outcome.sizes.members == 3
-    assert "the best of all choices for the members kept" in outcome.reason
-    assert "the 5 other members were left at their least size, of which no choice was tried" in outcome.reason
+def test_few_choices_for_all_members_are_all_evaluated():
+    case = case_with("[0, 1]")
+    outcome = run_session(case)
+    assert len(kept_of(outcome, [0.0, 1.0])) == 3
+    assert outcome.reason.startswith("sizes of 8 members chosen: the best of all choices, ")
+    best, at = brute(case, [0.0, 1.0], range(8))
+    assert outcome.objectives["G"] == pytest.approx(best, rel=1e-9)
+    assert outcome.alpha.tolist() == at
+
+
+@pytest.mark.parametrize("many", [300, 10], ids=["all choices", "branch and bound"])
+def test_behind_a_poor_choice_for_the_members_kept_others_are_allowed_sizes_too(many, monkeypatch):
+    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.size_search.MANY", many)
+    monkeypatch.setattr("mdstopo.session.sizes.MUCH_WORSE", 0.01)
+    monkeypatch.setattr("mdstopo.session.sizes.OTHERS", 3)
+    case, said = case_with("[0, 1]"), []
+    outcome = run_session(case, notify=said.append)
+    kept = kept_of(outcome, [0.0, 1.0])
+    alone, _ = brute(case, [0.0, 1.0], kept)
+    worse = alone / outcome.sizes.continuous - 1.0
+    assert said[-1].startswith("choosing sizes of 6 members of 8, 64 choices")
+    assert f"the best choice for the 3 kept is {worse:.1%} worse: now sizes of 6 members are chosen" in said
+    assert outcome.sizes.members == 6
+    assert outcome.sizes.exhaustive == (many == 300)
+    assert outcome.objectives["G"] <= alone
+    assert "the 2 other members were left at their least size, of which no choice was tried" in outcome.reason
+
+
+def test_a_good_choice_says_nothing_of_the_other_members():
     better = run_session(case_with("[0, 0.4, 1]"))
     assert better.objectives["G"] < 1.05 * better.sizes.continuous
+    assert better.sizes.members == 5
     assert "left at their least size" not in better.reason
 
 
 def test_prices_bound_the_choice(tmp_path):
     case = case_with(PRICED)
     outcome = run_session(case, path=tmp_path / "r.h5")
-    best, at = brute(case, outcome, [0.0, 0.4, 1.0], [0.0, 0.6, 1.0])
+    best, at = brute(case, [0.0, 0.4, 1.0], range(8), [0.0, 0.6, 1.0])
+    assert outcome.sizes.members == 8
+    alone, _ = brute(case, [0.0, 0.4, 1.0], kept_of(outcome, [0.0, 0.4, 1.0]), [0.0, 0.6, 1.0])
+    assert alone > 1.05 * outcome.sizes.continuous
     assert outcome.objectives["G"] == pytest.approx(best, rel=1e-9)
     assert outcome.alpha.tolist() == at
     excess = paid_by(outcome) - 3.5
@@ -133,11 +161,12 @@ def test_prices_count_beside_limits_on_responses(tmp_path):
 @pytest.mark.parametrize("few", [1000, 10], ids=["all choices", "branch and bound"])
 def test_members_that_are_not_kept_pay_for_the_least_size(few, monkeypatch):
     monkeypatch.setattr("mdstopo.session.size_search.FEW", few)
+    monkeypatch.setattr("mdstopo.session.sizes.MUCH_WORSE", 1.0)
     sizes, prices = [0.0, 0.4, 1.0], [0.2, 0.7, 1.2]
     case = case_with("{sizes: [0, 0.4, 1], prices: [0.2, 0.7, 1.2]}")
     outcome = run_session(case)
     assert outcome.sizes.members < case.n_design
-    best, at = brute(case, outcome, sizes, prices)
+    best, at = brute(case, sizes, kept_of(outcome, sizes), prices)
     assert outcome.objectives["G"] == pytest.approx(best, rel=1e-9)
     assert outcome.alpha.tolist() == at
     spent = sum(dict(zip(sizes, prices, strict=True))[size] for size in at)
@@ -162,7 +191,9 @@ def test_members_of_one_alpha_have_one_size():
     case = case_with("[0, 0.3, 1]", replace=[("design: {initial", "design: {shared: [straps], initial")])
     outcome = run_session(case)
     assert set(outcome.alpha.tolist()) == {0.3}
-    assert outcome.sizes.members == 1
+    assert outcome.sizes.members == 8
+    assert outcome.sizes.choices == 3
+    assert outcome.reason.startswith("sizes of 8 members chosen: the best of all choices, ")
 
 
 @pytest.mark.parametrize("sizes", ["[0, 1]", "[0, 0.4, 1]"])
@@ -170,6 +201,7 @@ def test_a_choice_of_sizes_says_how_far_it_is_between_evaluations_too(sizes, mon
     """Where all choices are tried there are no nodes; elsewhere the neighbours of the best are tried last."""
     monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
     monkeypatch.setattr("mdstopo.session.sizes.SAID_EVERY", 0.0)
+    monkeypatch.setattr("mdstopo.session.sizes.MUCH_WORSE", 1.0)
     told = []
     outcome = run_session(case_with(sizes), notify=told.append)
     rows = [sentence for sentence in told if sentence.startswith("choosing sizes: ")]
@@ -321,8 +353,10 @@ solver: {tolerance: 1e-8}
 """
 
 
-def test_members_that_are_next_to_nothing_get_a_size_where_without_them_a_limit_is_broken(tmp_path):
+def test_members_that_are_next_to_nothing_get_a_size_where_without_them_a_limit_is_broken(monkeypatch):
     """The run ended as failed: the spring along y has a size below half of 0.4, and was left out."""
+    for name in ("FEW", "MANY"):
+        monkeypatch.setattr(f"mdstopo.session.size_search.{name}", 10)
     case = read_case(CROSSED)
     without = run_session(replace(case, members=tuple(replace(group, sizes=()) for group in case.members)))
     assert 0.01 < without.alpha[1] < 0.2
@@ -336,11 +370,15 @@ def test_members_that_are_next_to_nothing_get_a_size_where_without_them_a_limit_
             best[found.objectives["X"]] = list(choice)
     assert outcome.alpha.tolist() == best[min(best)] == [0.7, 0.4]
     assert outcome.sizes.members == 2
-    assert any("no sizes of the 1 kept keep the constraints: now sizes of all 2 are chosen" in each for each in said)
+    assert any(
+        "no sizes of the 1 kept keep the constraints: now sizes of 2 members are chosen" in each for each in said
+    )
 
 
 @pytest.mark.parametrize("stopped", [6, 9, 11, 14])
-def test_a_choice_that_went_on_with_all_members_goes_on_where_it_was_stopped(tmp_path, stopped):
+def test_a_choice_that_went_on_with_all_members_goes_on_where_it_was_stopped(tmp_path, stopped, monkeypatch):
+    for name in ("FEW", "MANY"):
+        monkeypatch.setattr(f"mdstopo.session.size_search.{name}", 10)
     case = read_case(CROSSED)
     whole = run_session(case, path=tmp_path / "whole.h5")
     asked = 0
@@ -363,3 +401,30 @@ def test_a_choice_that_went_on_with_all_members_goes_on_where_it_was_stopped(tmp
     assert resumed.sizes == whole.sizes
     assert resumed.reason == whole.reason
     assert resumed.evaluations == whole.evaluations
+
+
+@pytest.mark.parametrize("stopped", [2, 8, 40, 150])
+def test_a_choice_that_went_on_behind_a_poor_one_goes_on_where_it_was_stopped(tmp_path, stopped, monkeypatch):
+    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.sizes.MUCH_WORSE", 0.01)
+    case = case_with("[0, 1]")
+    whole = run_session(case, path=tmp_path / "whole.h5")
+    assert whole.sizes.members == 8
+    asked = itertools.count()
+    searching = []
+
+    def notify(said):
+        if said.startswith("choosing sizes of"):
+            searching.append(said)
+
+    part = run_session(
+        case,
+        path=tmp_path / "part.h5",
+        stop_requested=lambda: bool(searching) and next(asked) > stopped,
+        notify=notify,
+    )
+    assert part.status is RunStatus.INTERRUPTED
+    assert len(searching) == (1 if stopped < 8 else 2)
+    resumed = run_session(case, path=tmp_path / "part.h5", resume=True)
+    assert np.array_equal(resumed.alpha, whole.alpha)
+    assert (resumed.sizes, resumed.reason, resumed.evaluations) == (whole.sizes, whole.reason, whole.evaluations)
