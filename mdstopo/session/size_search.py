@@ -27,8 +27,9 @@ from mdstopo.optimizer.state import State
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: so many choices are all evaluated, where nothing varies beside them; behind a poor search, many
-FEW, MANY = 1000, 5000
+#: so many choices are all evaluated, where nothing varies beside them: a search takes hundreds of evaluations or more,
+#: with gradients
+FEW = 5000
 #: evaluations after which the search ends with the best so far, and says that nodes are left
 MOST_EVALUATIONS = 50_000
 #: how near to a size, as a share of the way to the next one, a number counts as it
@@ -153,7 +154,6 @@ class SizeSearch:
         x: Floats,
         solve: Callable[[Problem, Floats], State],
         tolerance: float,
-        few: int | None = None,
     ) -> None:
         """Begin at the continuous optimum x (n,).
 
@@ -161,9 +161,7 @@ class SizeSearch:
         catalogued: the variables whose sizes are chosen.
         solve: optimises a problem from a design on.
         tolerance: relative; a node has to promise so much more than the best choice.
-        few: up to so many choices are all evaluated, where nothing varies beside them; FEW where None.
         """
-        self._few = FEW if few is None else few
         self._counts = [0]
         self._catalogued, self._solve, self._tolerance = catalogued, solve, tolerance
         self._rows = rows_for_sizes(problem.linear, catalogued)
@@ -201,7 +199,7 @@ class SizeSearch:
         seen: is given it after each node and after each choice that is tried where there are no nodes.
         """
         progress = self.progress
-        if self._catalogued.choices <= self._few and not len(self._others):
+        if self._catalogued.choices <= FEW and not len(self._others):
             self._try_all(stop, seen)
         while self._open and not progress.exhaustive and not stop() and self._counts[0] < MOST_EVALUATIONS:
             node = heapq.heappop(self._open)

@@ -38,6 +38,8 @@ KEPT = 0.5
 #: the others are allowed sizes, too
 MUCH_WORSE = 0.05
 OTHERS = 12
+#: ratios above it are told as two values
+MANY_TIMES = 10.0
 #: seconds between two lines on how far the choice is
 SAID_EVERY = 10.0
 
@@ -114,7 +116,7 @@ class Sizes:
         self._continuous = float(state.best_objective)
         x, hooks = state.best_alpha, (stop, keep, notify)
         if self._spent:  # an earlier process has come to the second search
-            progress = self._searched(problem, x, self._place_before(), *hooks, second=True)
+            progress = self._searched(problem, x, self._place_before(), *hooks)
         else:
             kept = self._kept(problem, x)
             progress = self._searched(problem, x, kept, *hooks)
@@ -124,7 +126,7 @@ class Sizes:
                 also = count_text(self._count(more))
                 notify(f"{fails if progress.x is None else poor}: now sizes of {also} members are chosen")
                 self._before, self._spent = None, progress.evaluations  # the next search is another one
-                progress = self._searched(problem, x, more, *hooks, second=True, known=progress)
+                progress = self._searched(problem, x, more, *hooks, progress)
         if (not progress.finished and stop()) or progress.x is None:
             return state
         return self._end(problem, state, progress.x, progress)
@@ -143,7 +145,6 @@ class Sizes:
         stop: Callable[[], bool],
         keep: Callable[[], None],
         notify: Callable[[str], None],
-        second: bool = False,
         known: SearchProgress | None = None,
     ) -> SearchProgress:
         """Search for sizes of some members; how far it has come.
@@ -152,12 +153,11 @@ class Sizes:
         x (n,): the continuous optimum.
         place (k,): the variables whose sizes are chosen; all others have their least size.
         stop, keep, notify: as of `choose`.
-        second: whether a search for fewer of them came before; known: what it has found.
+        known: what a search for fewer of them has found.
         """
         held, catalogued = self._held(problem, x, place)
         self._members = self._count(place)
-        few = size_search.MANY if second else size_search.FEW
-        search = SizeSearch(held, catalogued, held.initial, self._solve, self.case.optimizer.tolerance, few)
+        search = SizeSearch(held, catalogued, held.initial, self._solve, self.case.optimizer.tolerance)
         self._search = search
         if known is not None and known.x is not None:
             search.know(known.x, known.objective)
@@ -361,12 +361,15 @@ class Sizes:
         else:
             how = f"the best of {progress.nodes} nodes, after which the search ends"
         worse = self._worse(progress)
+        than = f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
+        if worse > MANY_TIMES:  # a share of next to nothing says nothing
+            value, before = self._sign * progress.objective, self._sign * self._continuous
+            than = f"{value:.6g}, where the continuous optimum has {before:.6g}"
         were = "other member was left at its" if left == 1 else "other members were left at their"
         apart = f"; the {left} {were} least size, of which no choice was tried" if left else ""
         return (
             f"sizes of {self._members} members chosen: {how}, {self._spent + progress.evaluations} evaluations; "
-            f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
-            f"{apart if worse > MUCH_WORSE else ''}"
+            f"{than}{apart if worse > MUCH_WORSE else ''}"
         )
 
 

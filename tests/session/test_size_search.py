@@ -7,9 +7,16 @@ import pytest
 
 from mdstopo.optimizer.interface import make, run
 from mdstopo.optimizer.problem import LinearRows, Sample
-from mdstopo.session.size_search import FEW, Catalogued, SizeSearch, Within
+from mdstopo.session import size_search
+from mdstopo.session.size_search import Catalogued, SizeSearch, Within
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import Status
+
+
+@pytest.fixture(autouse=True)
+def small_searches(monkeypatch):
+    """Few choices are fewer here, so that branch and bound has something to do in little time."""
+    monkeypatch.setattr(size_search, "FEW", 1000)
 
 
 class Springs:
@@ -68,7 +75,7 @@ def nothing(found):
 @pytest.mark.parametrize("seed", range(6))
 def test_branch_and_bound_finds_the_best_of_all_choices(seed):
     problem, sizes = Springs(seed, 7, 0.4, equal=seed % 2 == 0), [0.0, 0.4, 1.0]
-    assert len(sizes) ** 7 > FEW
+    assert len(sizes) ** 7 > size_search.FEW
     found = search_of(problem, sizes).run(never, nothing)
     assert found.finished
     assert not found.exhaustive
@@ -135,7 +142,7 @@ def test_a_search_that_is_stopped_among_the_last_neighbours_goes_on_to_the_same_
             return Sample(value, np.array([value]), slope, np.zeros(0), np.zeros((0, 4)), status=Status.OK)
 
     problem, sizes, asked, seen = Waves(3, 4, 0.45), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], [], []
-    assert len(sizes) ** 4 > FEW
+    assert len(sizes) ** 4 > size_search.FEW
 
     def ask():
         asked.append(0)
