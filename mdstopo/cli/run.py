@@ -309,9 +309,7 @@ def _sizes(chosen: "ChosenSizes") -> list[tuple[str, str]]:
         for name, sizes in chosen.sizes.items()
     ]
     how = "all evaluated" if chosen.exhaustive else f"{chosen.nodes} nodes"
-    found = (
-        f"{chosen.members} members, {count_text(chosen.choices)} choices; {how}, {chosen.evaluations} evaluations"
-    )
+    found = f"{chosen.members} members, {count_text(chosen.choices)} choices; {how}, {chosen.evaluations} evaluations"
     lines.append(("  choice", found + ("; found beside the best of the nodes" if chosen.exchanged else "")))
     if chosen.sizes:
         value, before = number(chosen.objective, 9), number(chosen.continuous, 9)

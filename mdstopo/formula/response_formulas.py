@@ -24,15 +24,21 @@ class ResponseProgram(NamedTuple):
     """Groups of formulas of a response.
 
     parts: how many groups its slopes by responses take; those of a margin follow its value, which is a group with its
-    slope by t and whether it is evaluated. switches: how many kinks and jumps it has.
+    slope by t and whether it is evaluated. switches: how many kinks and jumps it has. timed: of each, whether it
+    changes by time alone, as that of step(t - 2).
     is_timed: whether t is in it. is_norm: whether it is a root (times a number above 0), which has a kink at zero.
     """
 
     groups: tuple[Group, ...]
     parts: int
     switches: int
+    timed: tuple[bool, ...]
     is_timed: bool
     is_norm: bool
+
+    def margin_group(self, switch: int) -> int:
+        """The group of a switch's margin, its slope by t and whether it is evaluated."""
+        return SLOPES + self.parts + switch * (1 + self.parts)
 
 
 @functools.lru_cache(maxsize=256)
@@ -57,7 +63,9 @@ def response_program(
         groups.append(group_of((switch.margin, derivative(switch.margin, TIME), switch.relevant)))
         groups += _slopes(switch.margin, moving)
     parts = -(-responses // WIDTH)
-    return ResponseProgram(tuple(groups), parts, len(margins), TIME in names_in(root), _is_norm(root))
+    by_motion = {*moving, *(word for margin in margins for word in names_in(margin) if word.startswith("bit "))}
+    timed = tuple(by_motion.isdisjoint(names_in(margin)) for margin in margins)
+    return ResponseProgram(tuple(groups), parts, len(margins), timed, TIME in names_in(root), _is_norm(root))
 
 
 def _slopes(formula: Expression, moving: list[str]) -> list[Group]:

@@ -10,6 +10,8 @@ import pytest
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
+from mdstopo.engine import Evaluator
+from mdstopo.integrators.steps import OF_SAMPLES
 from mdstopo.status import Status
 from tests.variables.support import differences, whole
 
@@ -97,6 +99,9 @@ KINKED = {
     "root": (expression("sqrt(v^2)", v=VX), "mean"),
     "energy": (expression("e*abs(v)", e="energy", v=VX), "max"),
     "at_end": (expression("max(e, v)", e="energy", v=VX), "final"),
+    "steady": (expression("x^2*step(t - 0.2)", x=A), "mean"),
+    "late": (expression("x*step(t - w)", "w: 0.21", x=AX), "max_abs"),
+    "until": (expression("if(t < 0.3, min(x, 10), 0)", x=AX), "integral"),
 }
 
 
@@ -112,6 +117,25 @@ def test_gradients_through_kinks_and_jumps_are_those_of_differences(
         size = float(np.abs(gradient) @ np.abs(direction))
         assert size > 0.0, name
         assert abs(gradient @ direction - expected[name]) <= error * size, name
+
+
+@pytest.mark.parametrize("text", [PLANE, SPACE], ids=["plane", "space"])
+def test_switches_by_time_alone_are_looked_for_once_and_not_along_the_motion(text: str) -> None:
+    """The mean from 0.25 s on is that of the whole motion less that of one that ends there."""
+
+    def sampled(formula: str, end: float) -> tuple[float, int]:
+        case = looking(text.replace("end: 0.4", f"end: {end}"), {"G": (expression(formula, x=AX), "integral")})
+        evaluator = Evaluator(case)
+        found = evaluator.evaluate(case.initial).objectives["G"]
+        return found, int(evaluator.driver("default").work[OF_SAMPLES])
+
+    whole_motion, without = sampled("x^2", 0.4)
+    first, _ = sampled("x^2", 0.25)
+    behind, with_switch = sampled("x^2*step(t - 0.25)", 0.4)
+    assert behind == pytest.approx(whole_motion - first, rel=1e-6)
+    by_motion, located = sampled("x^2*step(t + 1e-300*x - 0.25)", 0.4)
+    assert by_motion == pytest.approx(behind, rel=1e-6)
+    assert with_switch < 1.2 * without < 0.6 * located
 
 
 @pytest.mark.parametrize(("integrator", "methods"), [("runge_kutta", ["direct"]), ("generalized_alpha", ["iterative"])])

@@ -31,6 +31,7 @@ from mdstopo.general.over_time.competing_members import compete, members_peaks
 from mdstopo.general.over_time.minima import minima
 from mdstopo.general.over_time.pieces import Pieces
 from mdstopo.general.over_time.quadrature_breakpoints import ROUNDS, followed_integrals, quadrature_breakpoints
+from mdstopo.general.over_time.switch_changes import moving_switches
 from mdstopo.general.over_time.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.responses.extremes import (
     COLUMNS,
@@ -413,7 +414,7 @@ class GeneralDriver:
             if gradient:
                 self.gradients[j, 0] *= slope
             self.row_counts[j] = 1
-            if switches_of(self.scene.model, j):
+            if moving_switches(self, j):
                 pieces = Pieces(self, j, t[: count + 1].copy())
                 self.jumps[j] = switched_integral(self, j, pieces, reduction.is_squared, slope)
             return

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from mdstopo.case.responses.expression_response import program_of
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.over_time.piece import Piece, add_piece, distinct_cuts
 from mdstopo.general.responses.extremes import FRACTIONS
-from mdstopo.general.responses.general_responses import switches_of
 from mdstopo.general.responses.sampled_roots import may_vanish, roots_between
 from mdstopo.scene.springs_model import FloatArray
 
@@ -33,11 +33,18 @@ def pieces_by_sides(driver: DriverWithRun, j: int, t: FloatArray) -> list[Piece]
     return pieces
 
 
+def moving_switches(driver: DriverWithRun, j: int) -> list[int]:
+    """The switches of response j that change by the motion; those that change by time alone do so where segments
+    end."""
+    response = driver.scene.responses[j]
+    return [k for k, timed in enumerate(program_of(response).timed) if not timed] if response.of else []
+
+
 def _cuts(driver: DriverWithRun, j: int, t: FloatArray, places: FloatArray) -> dict[int, list[float]]:
-    """By step, the fractions at which a margin vanishes. places (m K, 2): the FRACTIONS of all steps."""
+    """By step, the fractions at which a margin vanishes in it. places (m K, 2): the FRACTIONS of all steps."""
     count, samples = len(t) - 1, len(FRACTIONS)
     cuts: dict[int, list[float]] = {}
-    for switch in range(switches_of(driver.scene.model, j)):
+    for switch in moving_switches(driver, j):
         seen = driver.sample_response(j, places, False, count, who=-2 - switch)[2].reshape(count, samples, -1)
         margin, rate = seen[:, :, 0], seen[:, :, 1] * (np.diff(t) / (samples - 1))[:, None]
         for w, k in np.argwhere(may_vanish(margin, rate)).tolist():

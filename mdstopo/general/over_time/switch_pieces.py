@@ -56,10 +56,9 @@ def switched_integral(
     square: whether the integral is that of its square. slope: the derivative by it, of the value that it becomes.
     """
     found = []
-    largest = float(np.abs(pieces.samples[:, :, 0]).max())
-    for b in range(1, len(pieces)):
-        if pieces[b].who == pieces[b - 1].who or pieces.is_stated(b):
-            continue
+    changes = [b for b in range(1, len(pieces)) if pieces[b].who != pieces[b - 1].who and not pieces.is_stated(b)]
+    largest = float(np.abs(pieces.samples[:, :, 0]).max()) if changes else 0.0
+    for b in changes:
         before, behind = (float(seen[0]) for seen in pieces.one_sided_limits(b))
         drop = before * before - behind * behind if square else before - behind
         if abs(drop) <= SAME * largest * (largest if square else 1.0):

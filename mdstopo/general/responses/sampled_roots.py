@@ -67,6 +67,21 @@ def roots_between(
         width *= 0.1
 
 
+def roots_on_grid(
+    times: FloatArray, values: FloatArray, rates: FloatArray, exact: Callable[[FloatArray], FloatArray]
+) -> Iterator[float]:
+    """Times at which a smooth function of time vanishes.
+
+    times (K,): of samples, evenly spaced (s). values, rates (K,): of the function there, rates per s.
+    exact: values (N,) at any times (N,).
+    """
+    rates = rates * (times[1] - times[0])
+    for k in np.flatnonzero(may_vanish(values, rates)).tolist():
+        span = float(times[k]), float(times[k + 1])
+        ends = float(values[k]), float(values[k + 1])
+        yield from roots_between(span, ends, (float(rates[k]), float(rates[k + 1])), exact)
+
+
 def _bracketed(difference: Callable[[float], float], low: float, high: float) -> Iterator[float]:
     """The root between two fractions at which a difference has two signs, if it has in truth."""
     from scipy.optimize import brentq

@@ -19,6 +19,7 @@ from mdstopo.general.scene.drives import Drives, drives, drives_all, motion_time
 from mdstopo.general.scene.expression_rows import expression_codes, expression_data
 from mdstopo.general.scene.layout import arrange
 from mdstopo.general.scene.timed_loads import kink_times, mistake_of, parts_of, timed_loads
+from mdstopo.general.scene.timed_switches import switch_times
 from mdstopo.general.scene.variables import (
     adds_damping,
     along,
@@ -175,6 +176,7 @@ def _more_times(case: Case, load_case: LoadCase, dimension: Dimension) -> list[f
         + lasting_times(case, has_coarse_steps(case.solver))
         + motion_times(load_case, dimension)
         + watched_times(case, load_case)
+        + switch_times(*evaluated_in(case, load_case.name), load_case)
     )
 
 

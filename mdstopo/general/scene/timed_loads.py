@@ -14,7 +14,7 @@ from mdstopo.case.model import GROUND, Case, LoadCase
 from mdstopo.case.text.errors import CaseError, Mistake
 from mdstopo.compiler.formulas import FormulaCalls, address_of
 from mdstopo.formula.time_formulas import MARGIN, VALUE
-from mdstopo.general.responses.sampled_roots import may_vanish, roots_between
+from mdstopo.general.responses.sampled_roots import roots_on_grid
 from mdstopo.mechanics.kinematics.timed import ADDRESS, OFFSET, SCALE, TURNS, WIDTH
 from mdstopo.scene.signal_segments import formulas_of, signals_of
 from mdstopo.scene.springs_model import FloatArray, IndexArray
@@ -131,16 +131,11 @@ def _is_load(load_case: LoadCase, formula: TimeFormula) -> bool:
 def _kinks(called: _Called, grid: FloatArray, margins: FloatArray) -> Iterator[float]:
     """Where margins vanish between times of a grid (K,); margins (K, switches, 2): there, with their rates."""
     for switch in range(called.switches):
-        margin, rate = margins[:, switch].T
-        rate = rate * (grid[1] - grid[0])
 
         def exact(times: FloatArray, switch: int = switch) -> FloatArray:
             return np.array([called.margins(time, switch + 1)[0][switch][0] for time in times.tolist()])
 
-        for k in np.flatnonzero(may_vanish(margin, rate)).tolist():
-            span = float(grid[k]), float(grid[k + 1])
-            values = float(margin[k]), float(margin[k + 1])
-            yield from roots_between(span, values, (float(rate[k]), float(rate[k + 1])), exact)
+        yield from roots_on_grid(grid, margins[:, switch, 0], margins[:, switch, 1], exact)
 
 
 def timed_loads(parts: Iterable[tuple[int, TimedPart]], times: FloatArray) -> Timed:
