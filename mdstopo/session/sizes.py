@@ -251,15 +251,15 @@ class Sizes:
 
     def _kept(self, problem: Problem, x: Floats) -> Ints:
         """The variables of the members that are kept, by their places in x (k,): those with half of their least size in
-        the continuous optimum x (n,). Where that is some, and all choices are so few that each is evaluated: all."""
+        the continuous optimum x (n,). Where all choices are so few that each is evaluated it is all, unless none is kept
+        and a sum is to be equal, which the optimum then meets far below every size."""
         groups = self._groups_at()
         least = {place: next((size for size in group.sizes if size > 0.0), math.inf) for place, group in groups.items()}
         kept = [place for place in groups if x[place] >= KEPT * least[place]]
-        free = np.flatnonzero(problem.upper > problem.lower)
-        few = math.prod(len(group.sizes) for group in groups.values()) <= size_search.FEW and set(free.tolist()) <= set(
-            groups
-        )
-        return np.array(sorted(groups if kept and few else kept), dtype=np.int64)
+        choices = math.prod(len(group.sizes) for group in groups.values())
+        alone = set(np.flatnonzero(problem.upper > problem.lower).tolist()) <= set(groups)
+        everyone = choices <= size_search.FEW and alone and (len(kept) > 0 or not problem.linear.equal.any())
+        return np.array(sorted(groups if everyone else kept), dtype=np.int64)
 
     def _more(self, problem: Problem, x: Floats, kept: Ints, progress: SearchProgress) -> Ints:
         """The variables whose sizes are chosen behind a search for those of members kept, by their places in x (k,).

@@ -432,3 +432,15 @@ def test_a_continuous_optimum_of_next_to_nothing_is_told_beside_the_choice_and_n
     outcome = run_session(case_with("[0, 1]"))
     words = f"{outcome.objectives['G']:.6g}, where the continuous optimum has {outcome.sizes.continuous:.6g}"
     assert outcome.reason.endswith(words)
+
+
+def test_where_no_member_is_kept_few_choices_are_tried_all_the_same():
+    """The run ended as failed, though a choice keeps the limit: the optimum needs less than half of the least size."""
+    overrides = {"design.catalogue": {"x": [0, 1], "y": [0, 1]}, "objectives.X.sense": "maximize"}
+    case = read_case(CROSSED, overrides=overrides)
+    without = run_session(replace(case, members=tuple(replace(group, sizes=()) for group in case.members)))
+    assert without.alpha.max() < 0.5
+    outcome = run_session(case)
+    assert outcome.status is RunStatus.CONVERGED
+    assert outcome.alpha.tolist() == [0.0, 1.0]
+    assert outcome.reason.startswith("sizes of 2 members chosen: the best of all choices, ")
