@@ -118,11 +118,11 @@ class Sizes:
         if self._spent:  # an earlier process has come to the second search
             progress = self._searched(problem, x, self._place_before(), *hooks)
         else:
-            kept = self._kept(problem, x)
+            kept = self._kept(problem, x) if self._before is None else self._place_before()
             progress = self._searched(problem, x, kept, *hooks)
             if progress.finished and len(more := self._more(problem, x, kept, progress)) > len(kept):
                 fails = f"no sizes of the {self._members} kept keep the constraints"
-                poor = f"the best choice for the {self._members} kept is {self._worse(progress):.1%} worse"
+                poor = f"the best choice for the {self._members} kept is {self._beside_continuous(progress)}"
                 also = count_text(self._count(more))
                 notify(f"{fails if progress.x is None else poor}: now sizes of {also} members are chosen")
                 self._before, self._spent = None, progress.evaluations  # the next search is another one
@@ -251,7 +251,7 @@ class Sizes:
 
     def _kept(self, problem: Problem, x: Floats) -> Ints:
         """The variables of the members that are kept, by their places in x (k,): those with half of their least size in
-        the continuous optimum x (n,). Where all choices are so few that each is evaluated it is all, unless none is kept
+        the continuous optimum x (n,). Where choices are so few that each is evaluated it is all, unless none is kept
         and a sum is to be equal, which the optimum then meets far below every size."""
         groups = self._groups_at()
         least = {place: next((size for size in group.sizes if size > 0.0), math.inf) for place, group in groups.items()}
@@ -352,6 +352,14 @@ class Sizes:
         """By what share of it the best choice is worse than the continuous optimum."""
         return (progress.objective - self._continuous) / (abs(self._continuous) or 1.0)
 
+    def _beside_continuous(self, progress: SearchProgress) -> str:
+        """How much worse, or better, the best choice is than the continuous optimum, in words."""
+        worse = self._worse(progress)
+        if worse > MANY_TIMES:  # a share of next to nothing says nothing
+            value, before = self._sign * progress.objective, self._sign * self._continuous
+            return f"{value:.6g}, where the continuous optimum has {before:.6g}"
+        return f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
+
     def _reason(self, progress: SearchProgress) -> str:
         left = self._all - self._members
         if progress.exhaustive:
@@ -360,16 +368,11 @@ class Sizes:
             how = f"no one of {progress.nodes} nodes has a better relaxation"
         else:
             how = f"the best of {progress.nodes} nodes, after which the search ends"
-        worse = self._worse(progress)
-        than = f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
-        if worse > MANY_TIMES:  # a share of next to nothing says nothing
-            value, before = self._sign * progress.objective, self._sign * self._continuous
-            than = f"{value:.6g}, where the continuous optimum has {before:.6g}"
         were = "other member was left at its" if left == 1 else "other members were left at their"
         apart = f"; the {left} {were} least size, of which no choice was tried" if left else ""
         return (
             f"sizes of {self._members} members chosen: {how}, {self._spent + progress.evaluations} evaluations; "
-            f"{than}{apart if worse > MUCH_WORSE else ''}"
+            f"{self._beside_continuous(progress)}{apart if self._worse(progress) > MUCH_WORSE else ''}"
         )
 
 

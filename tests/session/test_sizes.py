@@ -117,7 +117,10 @@ def test_behind_a_poor_choice_for_the_members_kept_others_are_allowed_sizes_too(
     alone, _ = brute(case, [0.0, 1.0], kept)
     worse = alone / outcome.sizes.continuous - 1.0
     assert said[-1].startswith("choosing sizes of 6 members of 8, 64 choices")
-    assert f"the best choice for the 3 kept is {worse:.1%} worse: now sizes of 6 members are chosen" in said
+    assert (
+        f"the best choice for the 3 kept is {worse:.3%} worse than the continuous optimum: "
+        "now sizes of 6 members are chosen"
+    ) in said
     assert outcome.sizes.members == 6
     assert outcome.sizes.exhaustive == (few == 100)
     assert outcome.objectives["G"] <= alone
