@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 APPLICATIONS, ABOVE, KEPT = ("restraint", "tiedown", "mooring", "lander"), 0.02, 1e-5
 
 #: runs of one start, of an application from one of its first designs, beside whose ends lower designs are looked for
-ENDS = (("restraint", "half"), ("mooring", "default"), ("lander", "half"))
+ENDS = (("restraint", "half"), ("mooring", "default"), ("mooring", "few"), ("lander", "half"))
 #: from how many designs each, and how far these are off at most, and first steps go, in ranges of a variable
 BESIDE, OFF = 4, 0.01
 
