@@ -34,6 +34,8 @@ CATALOGUE, SEARCH = "catalogue", "catalogue/search"
 KEPT = 0.5
 #: a choice that is worse than the continuous optimum by more than this share tells how many members had no part in it
 MUCH_WORSE = 0.05
+#: one that is worse by more than this share of it, as of an optimum of next to nothing, is told by both values
+OTHER_SIZE = 10.0
 #: seconds between two lines on how far the choice is
 SAID_EVERY = 10.0
 
@@ -305,10 +307,13 @@ class Sizes:
         others = len(self._groups_at()) - self._kept
         left = "other member was left at its" if others == 1 else f"{others} other members were left at their"
         apart = f"; the {left} least size, of which no choice was tried" if others else ""
+        by = f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
+        if worse > OTHER_SIZE:
+            chosen, continuous = self._sign * progress.objective, self._sign * self._continuous
+            by = f"{chosen:.4g} where the continuous optimum has {continuous:.4g}"
         return (
             f"sizes of {self._kept} members chosen: {how}, {self._spent + progress.evaluations} evaluations; "
-            f"{abs(worse):.3%} {'better' if worse < 0.0 else 'worse'} than the continuous optimum"
-            f"{apart if worse > MUCH_WORSE else ''}"
+            f"{by}{apart if worse > MUCH_WORSE else ''}"
         )
 
 

@@ -12,6 +12,8 @@ from mdstopo.engine import Evaluator
 from mdstopo.plots.source import Source
 from mdstopo.report.report_tables import constraint_rows, objective_rows
 from mdstopo.session.run_session import run_session
+from mdstopo.session.size_search import SearchProgress
+from mdstopo.session.sizes import Sizes
 from mdstopo.status import RunStatus
 from mdstopo.store.result_reader import read_result
 
@@ -94,6 +96,15 @@ def test_the_sizes_of_a_run_are_the_best_of_all_choices(few, tmp_path, monkeypat
     assert view.alpha.tolist() == at
     assert "worse than the continuous optimum" in view.reason
     assert view.array("catalogue/continuous") == outcome.sizes.continuous
+
+
+def test_a_choice_beside_an_optimum_of_next_to_nothing_is_told_by_both_values():
+    """A percentage of next to nothing has ten digits and says nothing."""
+    sizes = Sizes(case_with("[0, 1]"))
+    sizes._continuous = 1e-9
+    assert " 0.5 where the continuous optimum has 1e-09" in sizes._reason(SearchProgress(objective=0.5))
+    sizes._continuous = 0.4
+    assert "25.000% worse than the continuous optimum" in sizes._reason(SearchProgress(objective=0.5))
 
 
 def test_a_poor_choice_tells_that_members_that_are_not_kept_had_no_part_in_it():
