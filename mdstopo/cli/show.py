@@ -118,9 +118,10 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
     stages = _stages(columns)
     within = f" in {stages} {'rounds' if 'round' in columns else 'stages'}" if stages > 1 else ""
     output.say(f"{total - stages} iterations{within}, {int(columns['evaluations'][-1])} evaluations")
-    rows = [["iterate", *names, "constraint", "change", "KKT", "evaluations", "time"]]
+    rows = [["iterate", *names, "violation", "change", "KKT", "evaluations", "time"]]
+    senses = _senses(view) if columns["constraints"].size else []
     for k in condensed(total):
-        worst = columns["constraints"][k].max(initial=float("-inf")) if columns["constraints"].size else float("nan")
+        worst = _violation(columns["constraints"][k], senses) if senses else float("nan")
         rows.append(
             [
                 str(k),
@@ -134,6 +135,32 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
         )
     output.table(rows)
     _say_failures(output, view)
+
+
+def _senses(view: "ResultView") -> list[str]:
+    """What each constraint bounds (`limit`, `equals`, `at_least`); empty where the case cannot be read any more."""
+    from mdstopo.case.text.errors import CaseError
+    from mdstopo.store.stored_case import case_of
+
+    try:
+        return [row.sense for row in case_of(view).constraints]
+    except CaseError:  # a file that it needs is gone
+        return []
+
+
+def _violation(excess: "NDArray[Any]", senses: list[str]) -> float:
+    """The largest amount by which an iterate breaks a constraint, each in its own unit; 0 where it keeps all of them,
+    NaN where it could not be evaluated.
+
+    excess (constraints,): values less bounds.
+    """
+    import numpy as np
+
+    broken = [
+        abs(by) if sense == "equals" else -by if sense == "at_least" else by
+        for by, sense in zip(excess.tolist(), senses, strict=True)
+    ]
+    return float(np.maximum(broken, 0.0).max())
 
 
 def _say_failures(output: Output, view: "ResultView") -> None:

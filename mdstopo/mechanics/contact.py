@@ -23,6 +23,8 @@ K, C, MU, SLIP, PX, PY, AX, AY, TX, TY, LENGTH = range(CONTACT)
 ABOVE, CLOSED, CLIPPED, BESIDE = range(4)
 #: a height this near to the edge, relative to 1 m, is at the switch: rates decide
 NEAR = 1e-12
+#: rates below this are rest (m/s): they decide nothing, as rounding alone moves bodies so fast
+REST = 1e-10
 
 
 @inline
@@ -167,20 +169,22 @@ def contact_next(c, height, rise, second, room, mode):
     mode: the present one.
     """
     on_edge = room >= 0.0
+    # what rests beside the edge is on the side where it is: the second rate is that of the mode which it has left
+    near = NEAR if abs(rise) > REST else 0.0
     if mode == BESIDE:
         return ABOVE
     if mode == ABOVE:
         if not on_edge:
             return BESIDE
-        if height < -NEAR:
+        if height < -near:
             return _touching(c, -height, rise)
         ahead = rise if rise != 0.0 else second
         return CLOSED if ahead < 0.0 else ABOVE
-    if height > NEAR:
+    if height > near:
         return ABOVE
     if not on_edge:
         return BESIDE
-    if height >= -NEAR:
+    if height >= -near:
         ahead = rise if rise != 0.0 else second
         return ABOVE if ahead > 0.0 else CLOSED
     return CLIPPED if mode == CLOSED else CLOSED

@@ -276,6 +276,23 @@ def test_show_says_what_a_file_holds(capsys: pytest.CaptureFixture[str]) -> None
     assert found["datasets"]["design/alpha"] == [12]
 
 
+def test_show_tells_by_how_much_iterates_break_their_constraints(capsys: pytest.CaptureFixture[str]) -> None:
+    """More than an `at_least` asks for breaks nothing, and less than it does."""
+    volumes = "{volume: all, at_least: 0.5}, {volume: all, limit: 3}"
+    moved = "{response: {displacement: {body: torso, relative_to: vehicle}}, at_least: 1}"
+    for more in ("", f", {moved}"):
+        call(
+            capsys, "run", "probe.yaml", "--set", f"constraints=[{volumes}{more}]", "--out", "bounded.h5", "--overwrite"
+        )
+        with h5py.File("bounded.h5") as file:
+            excess = file["iterations/constraints"][0]
+        assert excess[0] > 0.1
+        _, out, _ = call(capsys, "show", "bounded.h5")
+        header, first = (line.split() for line in out.splitlines()[3:5])
+        assert header[2] == "violation"
+        assert float(first[2]) == pytest.approx(-excess[2] if more else 0.0, rel=0.01)
+
+
 def test_a_full_disk_is_a_sentence_and_status_1(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

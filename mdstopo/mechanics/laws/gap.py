@@ -11,6 +11,8 @@ from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, always
 OPEN, CLOSED, CLIPPED = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide
 NEAR = 1e-12
+#: rates below this are rest (m/s): they decide nothing, as rounding alone moves bodies so fast
+REST = 1e-10
 
 
 @inline
@@ -127,12 +129,14 @@ def gap_next(p, x, xd, xdd, mode):
     """The mode that follows when the margin of this one is used up.
 
     Away from the gap its side decides, for a law may begin to act on a member that has moved meanwhile; at the gap
-    the rate does, then the second derivative. In contact only the force can have changed its sign: the other mode
-    follows without a second look, which might differ from the margin by rounding.
+    the rate does, then the second derivative. What rests beside the gap is on the side where it is, however near: its
+    second derivative is that of the mode which it has left, whose force beyond the gap would keep it there forever. In
+    contact only the force can have changed its sign: the other mode follows without a second look, which might differ
+    from the margin by rounding.
     """
     y = p[3] * x - p[2]
     rate = p[3] * xd
-    near = NEAR * max(1.0, abs(p[2]))
+    near = NEAR * max(1.0, abs(p[2])) if abs(rate) > REST else 0.0
     if y > near:
         if mode == OPEN:
             return _closed(p, y, rate)
