@@ -469,3 +469,21 @@ def test_what_candidates_gain_is_not_told_by_slopes_with_which_built_members_are
     status, reason = rounds.conclude(state)
     assert status is (RunStatus.FAILED if ended is RunStatus.FAILED else RunStatus.STALLED)
     assert "whether one of 640 candidates would lower G is not known" in reason
+
+
+def test_members_that_finalize_keeps_of_a_priced_run_stay_the_same(few: None, tmp_path: Path) -> None:
+    """Their points make other pairs, too, which are no candidates any more."""
+    case = tmp_path / "engine.yaml"
+    case.write_text(json.dumps(engine()))
+    result = tmp_path / "engine.h5"
+    assert run_group(["run", str(case), "--out", str(result), "--quiet"]) == 0
+    view = read_result(result)
+    (group,) = case_of(view).members
+    kept = np.sort(np.argsort(-view.alpha, kind="stable")[:6])
+    assert run_group(["finalize", str(result), "--keep", "6", "--quiet"]) == 0
+    final = read_case((tmp_path / "engine.final.yaml").read_text())
+    ends = [(each.from_world[0].tolist(), each.to_world[0].tolist()) for each in final.members]
+    assert ends == [
+        (group.from_world[i].tolist(), group.to_world[j].tolist())
+        for i, j in zip(group.from_index[kept], group.to_index[kept], strict=True)
+    ]
