@@ -47,7 +47,7 @@ def restricted(case: Case, kept: IndexArray, design: FloatArray) -> Case:
     value that of its values, because a case that settles has to settle with its initial design. Alphas that are one,
     and members of several groups that have one value, have to be kept together (`chosen`, `apart`).
     Variables of which no group is left are gone. Bounds of volume rows stay the numbers that they are. It has one
-    start, and of several powers the last.
+    start, and of several powers the last. No candidates are priced: other pairs of the points kept are none.
     """
     design = case.whole(design)
     groups = []
@@ -56,7 +56,7 @@ def restricted(case: Case, kept: IndexArray, design: FloatArray) -> Case:
             groups.append(group)
         elif len(own):
             initial = float(design[case.group_slices[group.name]][own].mean())
-            groups.append(replace(part(group, own), powers=(), initial=initial))
+            groups.append(replace(part(group, own), powers=(), initial=initial, candidates=None))
     names = {group.name for group in groups}
     variables = tuple(_variable(each, places, design[case.n_design :]) for each, places in _values(case, kept))
     rows = tuple(

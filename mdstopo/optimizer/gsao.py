@@ -156,7 +156,7 @@ class Gsao:
     def _first_state(self, alpha: Floats, sample: Sample, failed: bool) -> GsaoState:
         """The state at a first design, before a method begins."""
         n = len(alpha)
-        cuts, cut_gradients = no_cuts(n)
+        cuts, cut_gradients, cuts_lowered = no_cuts(n)
         return GsaoState(
             **known_at_first(alpha, sample, failed),
             rows=sample.rows,
@@ -167,6 +167,7 @@ class Gsao:
             row_details=RowDetails.of(sample),
             cuts=cuts,
             cut_gradients=cut_gradients,
+            cuts_lowered=cuts_lowered,
             forgotten=float("inf"),
             predicted=0.0,
             shift=Shifts(np.full(n, self.settings.number("shift_start"))),

@@ -56,7 +56,8 @@ class GsaoState(State):
     What was found at the iterate: `rows` (R,), `gradients` (R, N), `constraint_rows` (C,), `constraint_gradients`
     (C, N), `violation` (`violations.scaled_violation`), and `row_details`, which rows are norms and which constraint
     each belongs to. What rejected trials have shown: `cuts` (K,), rows that were the highest there, linearised and seen
-    from the iterate, and `cut_gradients` (K, N); `forgotten`, the objective at which they were last dropped.
+    from the iterate, `cut_gradients` (K, N), and `cuts_lowered` (K,), how much more than the objective they said of
+    iterates; `forgotten`, the objective at which they were last dropped.
 
     Of the trial: `predicted`, the decrease of the merit function that the model promises; infinite where the trial is
     no step but a design far from a least violation. The adaptation: `shift` (N,) distances of the shifts, `step` the
@@ -82,6 +83,7 @@ class GsaoState(State):
     row_details: RowDetails
     cuts: Floats
     cut_gradients: Floats
+    cuts_lowered: Floats
     forgotten: float
     predicted: float
     shift: Shifts
@@ -181,6 +183,8 @@ class GsaoState(State):
             return Shifts(np.array(arrays[name]))
         if name == "far_design_tried" and name not in arrays:  # of older files
             return False
+        if name == "cuts_lowered" and name not in arrays:  # of older files
+            return np.zeros(len(arrays["cuts"]))
         if name == "step":
             array = np.array(arrays[name])
             return Step(array, np.zeros(array.shape))

@@ -71,9 +71,9 @@ def why_unusable(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
     return sample.failure
 
 
-def cuts_of(state: GsaoState, sample: Sample) -> tuple[Floats, Floats, bool]:
-    """The cuts (K,) and their gradients (K, N) after `sample`, that of the state's trial, was rejected; and whether the
-    newest tell what stood in the way.
+def cuts_of(state: GsaoState, sample: Sample) -> tuple[Floats, Floats, Floats, bool]:
+    """The cuts (K,), their gradients (K, N) and by how much they were lowered (K,) after `sample`, that of the state's
+    trial, was rejected; and whether the newest tell what stood in the way.
 
     That were the highest rows there. Often they are none of the rows at the iterate: a peak that only rises on the way,
     or one of more than compete. Linearised they tell the next subproblem, as the null steps of bundle methods do
@@ -89,23 +89,26 @@ def cuts_of(state: GsaoState, sample: Sample) -> tuple[Floats, Floats, bool]:
     told = highest > state.objective and bool(seen[int(np.argmax(sample.rows[near]))] <= state.objective)
     values = np.concatenate([state.cuts, np.minimum(seen, state.objective)])
     gradients = np.concatenate([state.cut_gradients.reshape(-1, len(state.alpha)), slopes])
-    return values[-MOST_CUTS:], gradients[-MOST_CUTS:], told
+    lowered = np.concatenate([state.cuts_lowered, np.maximum(seen - state.objective, 0.0)])
+    return values[-MOST_CUTS:], gradients[-MOST_CUTS:], lowered[-MOST_CUTS:], told
 
 
-def cuts_from(state: GsaoState, trial: Floats, objective: float) -> tuple[Floats, Floats]:
-    """The cuts (K,) that are near enough to matter, and their gradients (K, N), seen from an accepted trial."""
+def cuts_from(state: GsaoState, trial: Floats, objective: float) -> tuple[Floats, Floats, Floats]:
+    """The cuts (K,) that are near enough to matter, their gradients (K, N) and by how much they were lowered (K,), seen
+    from an accepted trial."""
     if not len(state.cuts):
-        return state.cuts, state.cut_gradients
+        return state.cuts, state.cut_gradients, state.cuts_lowered
     if state.trust > KEPT_TRUST:
         return no_cuts(len(trial))
     seen = state.cuts + np.einsum("ri,i->r", state.cut_gradients, trial - state.alpha)
     near = seen >= objective - KEPT_WINDOW * abs(objective)
-    return np.minimum(seen[near], objective), state.cut_gradients[near]
+    lowered = state.cuts_lowered[near] + np.maximum(seen[near] - objective, 0.0)
+    return np.minimum(seen[near], objective), state.cut_gradients[near], lowered
 
 
-def no_cuts(n: int) -> tuple[Floats, Floats]:
+def no_cuts(n: int) -> tuple[Floats, Floats, Floats]:
     """No cutting planes, of n variables."""
-    return np.zeros(0), np.zeros((0, n))
+    return np.zeros(0), np.zeros((0, n)), np.zeros(0)
 
 
 def outdated(state: GsaoState) -> bool:

@@ -92,15 +92,15 @@ class SeparableMethod:
         state.convex = next_convex(state.convex, ratio, actual < state.predicted, settings)
         state.trust = next_trust(state.trust, ratio, settings) if self._trusted else 1.0
         if accepted:
-            state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
+            state.cuts, state.cut_gradients, state.cuts_lowered = cuts_from(state, state.trial, sample.objective)
             self._follow(state)
             state.take(sample, scaled_violation(sample))
         elif len(state.alpha) < WIDE and settings.number("peaks") > 1:
-            state.cuts, state.cut_gradients, told = cuts_of(state, sample)
+            state.cuts, state.cut_gradients, state.cuts_lowered, told = cuts_of(state, sample)
             if told:
                 state.trust, state.convex = CUT_SHRINK * trust, convex
         if small and outdated(state):  # which compares the new iterate
-            state.cuts, state.cut_gradients = no_cuts(len(state.alpha))
+            state.cuts, state.cut_gradients, state.cuts_lowered = no_cuts(len(state.alpha))
             state.forgotten, state.small = state.objective, 0
         return accepted
 
@@ -225,10 +225,10 @@ class SeparableMethod:
         """The projected KKT residual at the iterate with the subproblem's multipliers, relative to max
         |dU/dalpha|.
 
-        The largest of: what a step along the negative gradient of the Lagrangian, scaled by the largest
-        gradient entry, moves within the bounds; the gap of competing rows that carry a multiplier; the slack
-        of volume rows that carry one. At an optimum the subproblem returns the iterate and its multipliers,
-        and all are zero.
+        The largest of: what a step along the negative gradient of the Lagrangian, scaled by the largest gradient
+        entry, moves within the bounds; the gap of competing rows that carry a multiplier, of cuts with what they were
+        lowered by; the slack of volume rows that carry one. At an optimum the subproblem returns the iterate and its
+        multipliers, and all are zero.
         """
         steepest = residual_unit(state, float(self._measures.steepest(state.gradients)[0]))
         if steepest == 0.0:
@@ -239,7 +239,10 @@ class SeparableMethod:
         gradient = (gradient + np.einsum("r,ri->i", optimum.linear_multipliers, linear.A)) / steepest
         descended = np.clip(state.alpha - gradient, self.space.lower, self.space.upper)
         moved = np.abs(state.alpha - descended).max(initial=0.0)
-        gaps = optimum.multipliers[:n_obj] * (model.values[:n_obj].max() - model.values[:n_obj])
+        below = model.values[:n_obj].max() - model.values[:n_obj]
+        # a cut that said more of the iterate than is true is a slope of somewhere else, and no second peak here
+        below[n_obj - len(state.cuts) :] += state.cuts_lowered
+        gaps = optimum.multipliers[:n_obj] * below
         slack = np.where(linear.equal, 0.0, optimum.linear_multipliers * linear.excess(state.alpha))
         held = optimum.multipliers[n_obj:] * state.constraint_rows
         complementarity = float(np.abs(gaps).sum() + np.abs(slack).sum() + np.abs(held).sum()) / steepest

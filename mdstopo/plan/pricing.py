@@ -38,8 +38,9 @@ class Prices:
     seen: candidates. best: the largest gain of one, together: how much all of them may gain, relative to the
     objective, to first order. pairs: those that are to enter, by group; gains: of these, the largest first; left: the
     largest gain of any other one, -inf where there is none. built (n,): dL/dx of the members that are built, with the
-    multipliers of rows and limits. residual: of the optimality conditions of these members. rows (R + C,), linear (m,):
-    these multipliers; gradients (R + C, n): of the rows.
+    multipliers of rows and limits. residual: of the optimality conditions of these members; unsettled: what one of them
+    would gain by its slope, relative to the objective. rows (R + C,), linear (m,): these multipliers; gradients
+    (R + C, n): of the rows.
     """
 
     seen: int
@@ -50,6 +51,7 @@ class Prices:
     left: dict[str, float]
     built: Floats
     residual: float
+    unsettled: float
     rows: Floats
     linear: Floats
     gradients: Floats
@@ -78,7 +80,7 @@ def price(case: Case, of: Problem, x: Floats, count: int | None = None) -> Price
     """
     problem = cast("DesignProblem", of)
     evaluation = problem.evaluation(x)
-    if evaluation.status is not Status.OK:
+    if not evaluation.status.usable:
         return None
     sample = problem.sample_of(evaluation)
     residual, rows, linear = _multipliers(problem, sample, x)
@@ -86,6 +88,8 @@ def price(case: Case, of: Problem, x: Floats, count: int | None = None) -> Price
     gradients = gradients_of(sample)
     built = rows @ gradients + linear @ problem.linear.A
     scale = abs(sample.objective) or 1.0
+    room = np.where(built < 0.0, problem.upper - x, x - problem.lower)
+    unsettled = float((np.abs(built) * room).max(initial=0.0)) / scale
     seen, best, together = 0, 0.0, 0.0
     pairs: dict[str, Pairs] = {}
     gains: dict[str, Floats] = {}
@@ -100,7 +104,7 @@ def price(case: Case, of: Problem, x: Floats, count: int | None = None) -> Price
         for group in groups:
             pairs[group.name], gains[group.name] = (found.i, found.j), found.gain / scale
             left[group.name] = found.left / scale
-    return Prices(seen, best, together, pairs, gains, left, built, residual, rows, linear, gradients)
+    return Prices(seen, best, together, pairs, gains, left, built, residual, unsettled, rows, linear, gradients)
 
 
 def confirmed(case: Case, of: Problem, x: Floats, prices: Prices) -> Prices:

@@ -27,6 +27,9 @@ MOST_ROUNDS = 200
 WORTH_A_ROUND = 0.1
 #: rounds in a row that lower it by less, after which the run ends: what gains to first order does not in fact
 PATIENCE = 3
+#: residual of the optimality conditions of built members, with the slopes that prices follow from, and what these leave
+#: them to gain, relative: where an optimum has more of both, its slopes are those of one side of a kink
+ONE_SIDED = 1e-3
 #: the largest gain, in tolerances, up to which prices of laws that switch are confirmed with members that are built
 CLOSE = 10.0
 #: columns of the table of rounds in the file
@@ -91,21 +94,21 @@ class Rounds:
             if count is None or (found.best > little and fallen > little * abs(state.best_objective)):
                 break
             level += 1
+        small = WORTH_A_ROUND * tolerance * abs(state.best_objective)
+        falls = -np.diff([*(row[3] for row in self.rows[-PATIENCE:]), state.best_objective])
+        in_vain = len(falls) >= PATIENCE and bool(np.all(falls <= small))
         if count is None:
             self.candidates = found.seen
-            if self._switches and found.best <= CLOSE * tolerance:
+            if self._switches and (found.best <= CLOSE * tolerance or in_vain):
                 found = self.last = confirmed(self.case, problem, state.best_alpha, found)
         pairs, staying = self._entered(found, state, fallen > 0.0)
         entered = sum(len(i) for i, _ in found.pairs.values())
         left = self.case.n_design - int(staying.sum())
         row = (self.case.n_design, entered, left, state.best_objective, found.best, found.together, found.residual,
                level)  # fmt: skip
-        small = WORTH_A_ROUND * tolerance * abs(state.best_objective)
         enough = count is None and found.best <= tolerance and (found.together <= tolerance or fallen <= small)
         # a round that has not come to its optimum is followed by another
-        enough = enough and (state.status is RunStatus.CONVERGED or fallen <= small)
-        falls = -np.diff([*(row[3] for row in self.rows[-PATIENCE:]), state.best_objective])
-        in_vain = len(falls) >= PATIENCE and bool(np.all(falls <= small))
+        enough = enough and (state.status is RunStatus.CONVERGED or fallen <= small) and not _is_one_sided(found)
         self._ended = enough or not entered or in_vain or self.count + 1 >= MOST_ROUNDS
         if self._ended:
             row = (*row[:1], 0, 0, *row[3:])
@@ -127,18 +130,24 @@ class Rounds:
 
     def conclude(self, state: State) -> tuple[RunStatus, str]:
         """The run's status, and what is known of the candidates."""
+        stalled = RunStatus.FAILED if state.status is RunStatus.FAILED else RunStatus.STALLED
         if self.last is None or not self._ended:
-            return RunStatus.STALLED, f"{state.reason}; the candidates could not be priced"
+            return stalled, f"{state.reason}; the candidates could not be priced"
         several, objective = len(self.case.objectives) > 1, self.case.objectives[0]
         verb = "lower" if several or objective.sense == "minimize" else "raise"
         tolerance, best = self.case.optimizer.tolerance, self.last.best
         named = f"of {count_text(self.candidates)} candidates would {verb} {'U' if several else objective.name}"
         status = state.status
+        if _is_one_sided(self.last):
+            return stalled, (
+                f"{state.reason}; whether one {named} is not known: slopes, and so prices, are others on either side "
+                "of this design, as where a member only just touches"
+            )
         if best <= tolerance:
             words = f"no one {named} by more than {tolerance:.3g} of it"
         else:
             words = f"one {named} by {best:.3g} of it"
-            status = RunStatus.MAX_ITERATIONS if self.count >= MOST_ROUNDS else RunStatus.STALLED
+            status = RunStatus.MAX_ITERATIONS if self.count >= MOST_ROUNDS else stalled
         most = f"all together by {self.last.together:.2g} at most" if self.last.together > 0.0 else "nor all together"
         return status, f"{state.reason}; {words}, {most}, to first order"
 
@@ -191,3 +200,9 @@ class Rounds:
             self.candidates = int(view.array(f"{CANDIDATES}/count"))
         except (ValueError, TypeError, IndexError) as error:
             raise DamagedError(f"{view.path}: damaged: the rounds of pricing are not whole ({error})") from error
+
+
+def _is_one_sided(prices: Prices) -> bool:
+    """Whether prices follow from slopes with which built members are far from their optimum, as on one side of a kink:
+    then they do not tell what a candidate would gain."""
+    return prices.residual > ONE_SIDED and prices.unsettled > ONE_SIDED

@@ -9,6 +9,7 @@ from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import Floats, LinearRows, Sample
 from mdstopo.optimizer.state import State
 from mdstopo.settings.optimizer_presets import settings
+from mdstopo.status import RunStatus
 
 
 class Pieces:
@@ -75,3 +76,33 @@ def test_a_preset_of_one_peak_keeps_no_cuts() -> None:
     state = run(Gsao(Pieces(40, 12, 2, 0), settings(overrides={"peaks": 1}, max_iterations=30)))
     assert not len(state.cuts)
     assert not all(state.history.accepted)
+
+
+class Waves:
+    """A sum of waves, which bends both ways."""
+
+    def __init__(self, n: int, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        self.waves, self.phases = 6.0 * rng.normal(size=(6, n)), rng.uniform(0.0, 7.0, 6)
+        self.sizes = rng.normal(size=6)
+        self.initial, self.lower, self.upper = np.full(n, 0.5), np.zeros(n), np.ones(n)
+        self.linear = LinearRows(np.ones((1, n)), np.array([0.7 * n]), np.array([False]))
+
+    def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
+        angle = self.waves @ x + self.phases
+        value = 5.0 + float(self.sizes @ np.sin(angle))
+        slopes = (self.sizes * np.cos(angle)) @ self.waves
+        return Sample(value, np.array([value]), slopes[None], np.zeros(0), np.zeros((0, len(x))))
+
+
+@pytest.mark.parametrize(("n", "seed"), [(1, 16), (1, 30), (1, 47)])
+def test_a_slope_of_a_rejected_trial_is_no_second_peak_where_the_function_bends_downwards(n: int, seed: int) -> None:
+    """The slopes of iterate and trial oppose each other, and the run ended as converged where it could go on."""
+    problem = Waves(n, seed)
+    state = run(Gsao(problem, settings(max_iterations=100)))
+    x, slopes = state.best_alpha, problem.evaluate(state.best_alpha).gradients[0]
+    assert state.status is RunStatus.CONVERGED
+    assert problem.linear.A[0] @ x < problem.linear.b[0] - 1e-3
+    inside = (x > problem.lower + 1e-9) & (x < problem.upper - 1e-9)
+    assert np.abs(slopes[inside]).max(initial=0.0) <= 1e-3
+    assert np.all(np.where(x <= problem.lower + 1e-9, slopes, -slopes)[~inside] >= 0.0)

@@ -12,7 +12,7 @@ from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.gsao_state import Step
 from mdstopo.optimizer.powers import largest, powers, primitives
 from mdstopo.optimizer.problem import LinearRows, Sample
-from mdstopo.optimizer.safeguards import next_shift
+from mdstopo.optimizer.safeguards import next_shift, no_cuts
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State
 from mdstopo.optimizer.wide_kernels import COARSER, FEWEST
@@ -163,7 +163,7 @@ def test_linear_terms_take_steps_of_any_length_beside_their_shifts(n, shift):
     options = {"power": 1.0, "shift_start": shift, "shift_minimum": 0.05, "trust_start": 0.2}
     cost, least, most = problem.linear.A[0], problem.lower, problem.upper
     for state in states(problem, 12, **options):
-        state.cuts, state.cut_gradients = state.cuts[:0], state.cut_gradients[:0]
+        state.cuts, state.cut_gradients, state.cuts_lowered = no_cuts(n)
         slope, reach = state.gradients[0], state.trust * wide.ranges(least, most)
         kappa = state.convex * np.abs(slope).max() / wide.ranges(least, most)
         low, high = np.maximum(least, state.alpha - reach), np.minimum(most, state.alpha + reach)

@@ -16,13 +16,15 @@ from mdstopo.case.scene.candidates import coincident, with_members
 from mdstopo.case.text.errors import CaseError
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
+from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.scalarisation import Scalarisation
-from mdstopo.plan import pricing
+from mdstopo.plan import pricing, pricing_rounds
 from mdstopo.plan.pricing_rounds import COLUMNS
 from mdstopo.scene.refusals import refusals
 from mdstopo.session.outcome import Outcome
 from mdstopo.session.run_session import run_session
-from mdstopo.status import RunStatus
+from mdstopo.settings.optimizer_presets import settings
+from mdstopo.status import RunStatus, Status
 from mdstopo.store.result_reader import read_result
 from mdstopo.store.stored_case import case_of
 from tests.session.test_runs_and_files import assert_same_files, stop_after
@@ -437,3 +439,51 @@ def test_ends_that_meet_are_found_among_all_candidates() -> None:
     assert coincident(first, second, 1e-12) == (2, (2000, 7))
     lattice = np.stack(np.meshgrid(np.arange(50.0), np.arange(40.0)), axis=-1).reshape(-1, 2)
     assert coincident(lattice, lattice, 1e-12) == (2000, (0, 0))
+
+
+def test_candidates_are_priced_where_a_member_only_just_touches(few: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slopes hold on one side there, which optimisers go on with."""
+    case = case_from(engine())
+    problem: Any = Evaluator(case).problem()
+    x = np.full(case.n_design, 0.25)
+    whole, evaluation = pricing.price(case, problem, x), problem.evaluation
+    monkeypatch.setattr(problem, "evaluation", lambda x: evaluation(x)._replace(status=Status.GRAZING))
+    found = pricing.price(case, problem, x)
+    assert whole is not None
+    assert found is not None
+    assert found.best == whole.best > 0.0
+
+
+@pytest.mark.parametrize("ended", [RunStatus.CONVERGED, RunStatus.FAILED])
+def test_what_candidates_gain_is_not_told_by_slopes_with_which_built_members_are_at_no_optimum(
+    few: None, monkeypatch: pytest.MonkeyPatch, ended: RunStatus
+) -> None:
+    """As on one side of a kink; here at a design that is none."""
+    monkeypatch.setattr(pricing_rounds, "MOST_ROUNDS", 1)
+    case = case_from(engine())
+    problem = Evaluator(case).problem()
+    state = Gsao(problem, settings(max_iterations=1)).start()
+    state.status = ended
+    rounds = pricing_rounds.Rounds(case)
+    assert not rounds.go_on(problem, state)
+    status, reason = rounds.conclude(state)
+    assert status is (RunStatus.FAILED if ended is RunStatus.FAILED else RunStatus.STALLED)
+    assert "whether one of 640 candidates would lower G is not known" in reason
+
+
+def test_members_that_finalize_keeps_of_a_priced_run_stay_the_same(few: None, tmp_path: Path) -> None:
+    """Their points make other pairs, too, which are no candidates any more."""
+    case = tmp_path / "engine.yaml"
+    case.write_text(json.dumps(engine()))
+    result = tmp_path / "engine.h5"
+    assert run_group(["run", str(case), "--out", str(result), "--quiet"]) == 0
+    view = read_result(result)
+    (group,) = case_of(view).members
+    kept = np.sort(np.argsort(-view.alpha, kind="stable")[:6])
+    assert run_group(["finalize", str(result), "--keep", "6", "--quiet"]) == 0
+    final = read_case((tmp_path / "engine.final.yaml").read_text())
+    ends = [(each.from_world[0].tolist(), each.to_world[0].tolist()) for each in final.members]
+    assert ends == [
+        (group.from_world[i].tolist(), group.to_world[j].tolist())
+        for i, j in zip(group.from_index[kept], group.to_index[kept], strict=True)
+    ]
