@@ -17,7 +17,7 @@ from benchmarks.moving import draw_moving
 from benchmarks.optimum import problems
 from benchmarks.scenes import CASES
 from mdstopo import optimize
-from mdstopo.plots.style import COLOURS, new_figure, save, styled
+from mdstopo.plots.style import COLOURS, new_figure, save, styled, use_log_scale
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 
@@ -73,7 +73,7 @@ def draw_limits() -> None:
             axis.plot(count[taken], series[taken], color=colour, marker="o", label="accepted")
             if label != "KKT residual":
                 axis.plot(count[~taken], series[~taken], "x", color="#555555", label="rejected")
-            axis.set_yscale("log")
+            use_log_scale(axis)
             axis.set_ylabel(label)
         if problem.exact is not None:
             axes[0].axhline(problem.exact, color="black", linewidth=0.6, linestyle="--", label="exact optimum")

@@ -199,7 +199,7 @@ def verdict(
     if stuck:
         return RunStatus.STALLED, (
             f"no step is found that lowers the objective, at a projected KKT residual of {state.kkt:.2g} "
-            f"where {settings.tolerance:.2g} was asked for"
+            f"where {settings.tolerance:.2g} was asked for{recent_change(state)}"
         )
     if state.iteration >= settings.max_iterations:
         return RunStatus.MAX_ITERATIONS, (
@@ -218,8 +218,9 @@ def recent_change(state: GsaoState) -> str:
         return ""
     change = (state.objective - before) / abs(before)
     if change == 0.0:
-        return f"; the last {count} changed nothing"
-    return f"; the last {count} {'lowered' if change < 0.0 else 'raised'} the objective by {abs(change):.2g} of itself"
+        return f"; the last {count} iterations changed nothing"
+    way = "lowered" if change < 0.0 else "raised"
+    return f"; the last {count} iterations {way} the objective by {abs(change):.2g} of itself"
 
 
 def is_at_bound(state: GsaoState, tolerance: float, bound: float) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.case.responses.response_units import unit_of_value
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import colour, new_figure
+from mdstopo.plots.style import colour, new_figure, use_log_scale
 from mdstopo.store.store_errors import StoreError
 
 
@@ -25,7 +25,7 @@ def draw(module: Any, source: Source) -> Any:
         axis.plot(np.arange(len(series)), series, color=colour(k), marker=".", markersize=2)
         positive = series[np.isfinite(series)]
         if len(positive) and positive.min() > 0.0 and positive.max() > 20.0 * positive.min():
-            axis.set_yscale("log")
+            use_log_scale(axis)
         axis.set_ylabel(label)
     axes[-1].set_xlabel("iteration")
     axes[-1].xaxis.get_major_locator().set_params(integer=True)

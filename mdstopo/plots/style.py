@@ -55,6 +55,14 @@ _DARK: dict[str, Any] = {
 }
 
 
+def use_log_scale(axis: Any) -> None:
+    """Give the values of an axis a logarithmic scale, with plain numbers: Matplotlib's own labels are formulas, which
+    this style does not set."""
+    axis.set_yscale("log")
+    axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.yaxis.set_minor_formatter(lambda value, _: "")
+
+
 def is_dark() -> bool:
     """Whether the style that is on draws on a dark ground."""
     matplotlib = sys.modules.get("matplotlib")  # what draws without it draws on a light ground

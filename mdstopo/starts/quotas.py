@@ -1,4 +1,6 @@
 """Several starts in quotas: all go a little way, those that come to what another comes to are dropped, the best go on.
+The first one, from the stated design, goes on to its end, or is dropped for one that comes to the same: several starts
+are not to end higher than one.
 
 Those that begin at the best design do so one after the other: the next one at what the last one has made better. They
 do not where the others have come to so few optima so often that there are hardly more (`all_found`).
@@ -126,7 +128,7 @@ class _Going:
             if not any(state.iteration > look for state in going):
                 if look in (TRIAL, SECOND_TRIAL):
                     # a softened start begins at the optimum of another problem, and is slow to leave it
-                    some = [index for index in asked if self.families[index] is not Family.SOFTENED]
+                    some = [index for index in asked if self.families[index] not in (Family.STATED, Family.SOFTENED)]
                     drop_lagging(some, [*others, *asked], self.tolerance, self.states, self.keep)
                 drop_twins(asked, others, self.tolerance, self.states, self.keep)
             yield [StartTask(index, self.families[index], following) for index in asked if _goes_on(self.states[index])]
@@ -200,8 +202,8 @@ def _goes_on(state: State | None) -> bool:
 def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
     """Mark the starts that do not go on after so many iterations. tolerance: of violations.
 
-    The best third of the distinct ones goes on, and those that are still falling fast. Where one has gone on from here
-    it is decided already: a resumed run must not decide again by what that one has found since.
+    The first one goes on, the best third of the distinct ones, and those that are still falling fast. Where one has gone
+    on from here it is decided already: a resumed run must not decide again by what that one has found since.
     """
     begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.dropped]
     if any(state.iteration > quota for _, state in begun):
@@ -211,7 +213,7 @@ def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, Stat
     kept: list[tuple[int, State]] = []
     for index, state in order:
         twin = twin_of(state, kept)
-        good = not kept or (near(state, kept[0][1], tolerance) and (len(kept) < most or falls(state)))
+        good = index == 0 or not kept or (near(state, kept[0][1], tolerance) and (len(kept) < most or falls(state)))
         if twin < 0 and good:
             kept.append((index, state))
         elif state.running:

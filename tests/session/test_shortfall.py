@@ -93,7 +93,7 @@ def test_several_runs_are_told_together_with_the_largest_residual() -> None:
 def test_a_run_that_used_its_iterations_tells_its_residual_and_what_the_last_ones_gained(done) -> None:
     assert done.status == "max_iterations"
     assert f"KKT residual of {done.kkt:.2g}" in done.reason
-    assert "; the last 4 " in done.reason
+    assert "; the last 4 iterations " in done.reason
 
 
 def test_a_run_that_stalls_ends_with_the_warning_in_its_outcome() -> None:
