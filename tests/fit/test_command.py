@@ -99,6 +99,33 @@ def test_json_is_one_object(folder: Path, capsys: pytest.CaptureFixture[str]) ->
     assert [each["name"] for each in said["estimates"]] == ["gravity[1]", "bodies.stone.velocity[1]"]
 
 
+def test_a_fit_that_is_killed_goes_on_beside_the_fitted_case_of_the_one_before(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its checkpoints knew nothing of that case, and `--resume` was refused."""
+    command = ["fit", "fall.yaml", "--set", "fit.starts=3"]
+    assert run_group(command) == 0
+    whole = result(folder / "results" / "fall.fit.h5")
+    own, calls = module.fitted, []
+
+    class KilledError(Exception):
+        pass
+
+    def killed(problem: Any, start: Any, stop: Callable[[], bool], seen: Callable[[Any], None]) -> Any:
+        calls.append(start)
+        if len(calls) == 2:
+            raise KilledError
+        return own(problem, start, stop, seen)
+
+    monkeypatch.setattr(module, "fitted", killed)
+    with pytest.raises(KilledError):
+        run_group(command)
+    monkeypatch.setattr(module, "fitted", own)
+    assert result(folder / "results" / "fall.fit.h5")["status"] == "running"
+    assert run_group([*command, "--resume"]) == 0
+    assert result(folder / "results" / "fall.fit.h5")["estimates"] == whole["estimates"]
+
+
 def test_a_run_that_is_stopped_goes_on(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
