@@ -202,8 +202,8 @@ def _goes_on(state: State | None) -> bool:
 def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
     """Mark the starts that do not go on after so many iterations. tolerance: of violations.
 
-    The first one goes on, the best third of the distinct ones, and those that are still falling fast. Where one has gone
-    on from here it is decided already: a resumed run must not decide again by what that one has found since.
+    The first one goes on, the best third of the distinct ones, and those that are still falling fast. Where one has
+    gone on from here it is decided already: a resumed run must not decide again by what that one has found since.
     """
     begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.dropped]
     if any(state.iteration > quota for _, state in begun):
