@@ -1,6 +1,6 @@
 """Several starts in quotas: all go a little way, those that come to what another comes to are dropped, the best go on.
-The first one, from the stated design, goes on to its end, or is dropped for one that comes to the same: several starts
-are not to end higher than one.
+The first one, from the stated design, goes on behind all others where it was dropped: several starts end no higher than
+one, unless it came to the same as another one.
 
 Those that begin at the best design do so one after the other: the next one at what the last one has made better. They
 do not where the others have come to so few optima so often that there are hardly more (`all_found`).
@@ -61,7 +61,9 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
     going = _Going(families, tolerance, states, keep)
     yield [StartTask(index, families[index], TRIAL) for index in early]
     yield from going.on(early, (), (TRIAL, *LOOKS), QUOTAS[0])
-    further = any(states[index] is not None for index in late) or not all_found([states[index] for index in early])
+    decided = any(state is not None and _is_taken_up(state) for state in states)
+    begun = any(states[index] is not None for index in late)
+    further = begun or not (decided or all_found([states[index] for index in early]))
     for place, index in enumerate(late if further else ()):
         # of those before alone: a resumed run may have begun later ones, and must begin the rest as it would have
         before = [*early, *late[:place]]
@@ -71,6 +73,12 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
     for quota, looks, following in zip(QUOTAS, (LATER_LOOKS, ()), (*QUOTAS[1:], None), strict=True):
         drop(tolerance, states, quota, keep)
         yield from going.on(range(count), (), (quota, *looks), following)
+    first = states[0]
+    if first is not None and first.dropped and first.twin < 0:
+        states[0] = first = replace(_taken_up(first), twin=0)
+        keep(0, first)
+    if first is not None and _is_taken_up(first):
+        yield [StartTask(0, families[0])]
 
 
 def all_found(states: Sequence[State | None]) -> bool:
@@ -123,12 +131,12 @@ class _Going:
         """The rounds of the starts `asked` from iteration to iteration, those left out that come to the same as a
         better one of them or as one of `others`. looks: iterations after which it is seen; last: where they pause."""
         for look, following in zip(looks, (*looks[1:], last), strict=True):
-            going = [state for index in asked if (state := self.states[index]) is not None and not state.dropped]
+            going = [state for index in asked if (state := self.states[index]) is not None and _goes_on(state)]
             # where one has gone on from here it is decided already: a resumed run does not decide by what that found
             if not any(state.iteration > look for state in going):
                 if look in (TRIAL, SECOND_TRIAL):
                     # a softened start begins at the optimum of another problem, and is slow to leave it
-                    some = [index for index in asked if self.families[index] not in (Family.STATED, Family.SOFTENED)]
+                    some = [index for index in asked if self.families[index] is not Family.SOFTENED]
                     drop_lagging(some, [*others, *asked], self.tolerance, self.states, self.keep)
                 drop_twins(asked, others, self.tolerance, self.states, self.keep)
             yield [StartTask(index, self.families[index], following) for index in asked if _goes_on(self.states[index])]
@@ -141,7 +149,13 @@ def drop_lagging(
     best = states[others[best_run([states[each] for each in others], tolerance)]]
     for index in asked:
         state = states[index]
-        if state is not None and state.running and best is not None and lags(state, best, tolerance):
+        if (
+            state is not None
+            and state.running
+            and _goes_on(state)
+            and best is not None
+            and lags(state, best, tolerance)
+        ):
             states[index] = marked = _dropped(state, "other starts were far better")
             keep(index, marked)
 
@@ -161,8 +175,8 @@ def drop_twins(
     states: of all starts.
     keep: is given what changes.
     """
-    going = [(index, state) for index in asked if (state := states[index]) is not None and not state.dropped]
-    kept = [(index, state) for index in others if (state := states[index]) is not None and not state.dropped]
+    going = [(index, state) for index in asked if (state := states[index]) is not None and _goes_on(state)]
+    kept = [(index, state) for index in others if (state := states[index]) is not None and _goes_on(state)]
     for index, state in sorted(going, key=lambda each: (*rank(each[1], tolerance), each[0])):
         twin = twin_of(state, kept)
         if twin < 0 or not state.running:
@@ -196,16 +210,21 @@ def _dropped(state: State, why: str, twin: int = -1) -> State:
 
 
 def _goes_on(state: State | None) -> bool:
-    return state is not None and not state.dropped
+    return state is not None and not state.dropped and not _is_taken_up(state)
+
+
+def _is_taken_up(state: State) -> bool:
+    """Whether a start was dropped, and goes on behind all others: it alone has a twin, itself, and is not dropped."""
+    return not state.dropped and state.twin >= 0
 
 
 def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
     """Mark the starts that do not go on after so many iterations. tolerance: of violations.
 
-    The first one goes on, the best third of the distinct ones, and those that are still falling fast. Where one has
-    gone on from here it is decided already: a resumed run must not decide again by what that one has found since.
+    The best third of the distinct ones goes on, and those that are still falling fast. Where one has gone on from here
+    it is decided already: a resumed run must not decide again by what that one has found since.
     """
-    begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.dropped]
+    begun = [(index, state) for index, state in enumerate(states) if state is not None and _goes_on(state)]
     if any(state.iteration > quota for _, state in begun):
         return
     order = sorted(begun, key=lambda each: (*rank(each[1], tolerance), each[0]))
@@ -213,7 +232,7 @@ def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, Stat
     kept: list[tuple[int, State]] = []
     for index, state in order:
         twin = twin_of(state, kept)
-        good = index == 0 or not kept or (near(state, kept[0][1], tolerance) and (len(kept) < most or falls(state)))
+        good = not kept or (near(state, kept[0][1], tolerance) and (len(kept) < most or falls(state)))
         if twin < 0 and good:
             kept.append((index, state))
         elif state.running:
@@ -235,7 +254,7 @@ def carried_over(case: Case, states: States, before: int) -> States:
     for index, state in enumerate(states[:before]):
         alike = len({family_of(index, starts, case.n_design > 0) for starts in (before, len(states))}) == 1
         if state is not None and alike and not (in_quotas and state.iteration > TRIAL):
-            found[index] = _taken_up(state) if state.dropped else state
+            found[index] = _taken_up(state) if state.dropped or _is_taken_up(state) else state
     return found
 
 
