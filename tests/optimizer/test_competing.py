@@ -120,6 +120,31 @@ def test_several_constraints_have_a_price_each():
     assert state.best_alpha == pytest.approx(np.full(2, np.sqrt(0.2)), abs=1e-5)
 
 
+@pytest.mark.parametrize("penalty", [1e9, 1e15, 1e30])
+def test_penalties_that_were_raised_ever_more_leave_the_residual_as_it_is(penalty):
+    """A residual of 2.9e6 was told of a design next to its optimum, where violations were rounding."""
+    a, b = np.array([1.0, 4.0, 2.0]), np.array([4.0, 1.0, 3.0])
+
+    def limits(x):
+        rows = np.array([a @ x**2 - 1.0, b @ x**2 - 1.0, x.sum() - 5.0])
+        return rows, np.stack([2.0 * a * x, 2.0 * b * x, np.ones(3)])
+
+    problem = Toy(lambda x: (np.array([-x.sum()]), -np.ones((1, 3))), [0.1] * 3, 0.0, 1.0, constraints=limits)
+    problem.competes = True
+    optimizer = Gsao(problem, settings(max_iterations=200, tolerance=1e-12))
+    state = optimizer.start()
+    while state.running and state.iteration < 6:
+        state = optimizer.step(state)
+    told = []
+    for factor in (1.0, penalty):
+        tried = state.copy()
+        tried.kkt, tried.penalty = float("nan"), factor * np.maximum(state.penalty, 1.0)
+        optimizer._method(tried).propose(tried)
+        told.append(tried.kkt)
+    assert told[0] < 1.0
+    assert told[1] == pytest.approx(told[0], rel=1e-6, abs=1e-9)
+
+
 def test_no_word_is_said_that_the_residual_does_not_bear_out():
     """Whatever the limit on iterations: converged only with a residual within the tolerance."""
     for most in range(12):
