@@ -193,6 +193,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "general/test_peak_search.py": ("-alpha]", "peak[everything"),
     "general/test_projection.py": ("",),
     "general/test_row_sweep.py": ("-alpha]", "[everything-"),
+    "general/test_sampled_roots.py": ("a_mean_of_what",),
     "general/test_settle.py": (
         "nothing_to_settle[1",
         "nothing_to_settle[2",

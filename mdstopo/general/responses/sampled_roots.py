@@ -9,6 +9,12 @@ from mdstopo.scene.springs_model import FloatArray
 
 #: looks at a dip of a function that may pass zero
 TRIALS = 4
+#: where between two samples a function is compared with the cubic of their values and rates; by what share of the
+#: largest value there it may differ; how often what differs more is halved
+PLACES, SHARE, HALVINGS = (0.29, 0.5, 0.73), 0.02, 8
+#: shares of an interval: over which a rate is a difference, and from which on behind a root at its start others are
+#: looked for
+APART, BEHIND = 1e-4, 1e-6
 
 
 def may_vanish(values: FloatArray, rates: FloatArray) -> NDArray[np.bool_]:
@@ -72,14 +78,54 @@ def roots_on_grid(
 ) -> Iterator[float]:
     """Times at which a smooth function of time vanishes.
 
-    times (K,): of samples, evenly spaced (s). values, rates (K,): of the function there, rates per s.
+    Between two samples it may turn more often than the cubic through both ends does; there it is sampled more closely.
+
+    times (K,): of samples (s), rising. values, rates (K,): of the function there, rates per s.
     exact: values (N,) at any times (N,).
     """
-    rates = rates * (times[1] - times[0])
-    for k in np.flatnonzero(may_vanish(values, rates)).tolist():
+    times, values, rates = _resolved(times, values, rates, exact)
+    for k in np.flatnonzero(values == 0.0).tolist():
+        yield float(times[k])
+        if k + 1 < len(times):  # its sign behind is that of its rate: another root in the interval would be hidden
+            times[k] += BEHIND * (times[k + 1] - times[k])
+            values[k] = exact(times[k : k + 1])[0]
+    widths = np.diff(times)
+    turns = (values[:-1] >= 0.0) != (values[1:] >= 0.0)
+    dips = (values[:-1] * rates[:-1] < 0.0) & (values[1:] * rates[1:] > 0.0)
+    for k in np.flatnonzero(turns | dips).tolist():
         span = float(times[k]), float(times[k + 1])
         ends = float(values[k]), float(values[k + 1])
-        yield from roots_between(span, ends, (float(rates[k]), float(rates[k + 1])), exact)
+        slopes = float(rates[k] * widths[k]), float(rates[k + 1] * widths[k])
+        yield from roots_between(span, ends, slopes, exact)
+
+
+def _resolved(
+    times: FloatArray, values: FloatArray, rates: FloatArray, exact: Callable[[FloatArray], FloatArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The samples of `roots_on_grid` and further ones, between which the function is the cubic of both ends."""
+    line = values[0] + rates[0] * (times - times[0])
+    if np.all(np.abs(values - line) <= 1e-12 * np.abs(values).max()):
+        return times.copy(), values.copy(), rates
+    open_ = np.arange(len(times) - 1)
+    for _ in range(HALVINGS):
+        start, width = times[open_], times[open_ + 1] - times[open_]
+        f0, f1, r0, r1 = values[open_], values[open_ + 1], rates[open_] * width, rates[open_ + 1] * width
+        largest, off = np.maximum(np.abs(f0), np.abs(f1)), np.zeros(len(open_))
+        for c in PLACES:
+            cubic = f0 + c * (r0 + c * (3.0 * (f1 - f0) - 2.0 * r0 - r1 + c * (r0 + r1 - 2.0 * (f1 - f0))))
+            seen = exact(start + c * width)
+            largest, off = np.maximum(largest, np.abs(seen)), np.maximum(off, np.abs(seen - cubic))
+        split = open_[off > SHARE * largest]
+        if not len(split):
+            break
+        width = times[split + 1] - times[split]
+        middle = times[split] + 0.5 * width
+        ahead, back = exact(middle + APART * width), exact(middle - APART * width)
+        times, values = np.insert(times, split + 1, middle), np.insert(values, split + 1, exact(middle))
+        rates = np.insert(rates, split + 1, (ahead - back) / (2.0 * APART * width))
+        first = split + np.arange(len(split))
+        open_ = np.sort(np.concatenate([first, first + 1]))
+    return times.copy(), values.copy(), rates
 
 
 def _bracketed(difference: Callable[[float], float], low: float, high: float) -> Iterator[float]:
