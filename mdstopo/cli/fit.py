@@ -166,8 +166,8 @@ def _fitted(
     announce_compilation(output, prepared(case))
     problem = FitProblem(case)
     known = None if before is None else _restored(problem, before)
-    beside = fitted_place.read_bytes().decode(errors="replace") if fitted_place.exists() else None
-    file = FitFile(place, problem, asked.line, beside)
+    fitted_before = fitted_place.read_bytes().decode(errors="replace") if fitted_place.exists() else None
+    file = FitFile(place, problem, asked.line, fitted_before)
     run = FitRun(problem) if known is None else known
     saver = Checkpointer(lambda: file.checkpoint(run, output.notice))
 

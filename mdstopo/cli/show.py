@@ -119,48 +119,39 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
     within = f" in {stages} {'rounds' if 'round' in columns else 'stages'}" if stages > 1 else ""
     output.say(f"{total - stages} iterations{within}, {int(columns['evaluations'][-1])} evaluations")
     rows = [["iterate", *names, "violation", "change", "KKT", "evaluations", "time"]]
-    senses = _senses(view) if columns["constraints"].size else []
-    for k in condensed(total):
-        worst = _violation(columns["constraints"][k], senses) if senses else float("nan")
-        rows.append(
-            [
-                str(k),
-                *(number(value) for value in columns["objectives"][k]),
-                number(worst, 3),
-                number(columns["change"][k], 3),
-                number(columns["kkt"][k], 2) if "kkt" in columns else "",
-                str(int(columns["evaluations"][k])),
-                duration(float(columns["seconds"][k])),
-            ]
-        )
+    violations = _violations(view)
+    rows += [
+        [
+            str(k),
+            *(number(value) for value in columns["objectives"][k]),
+            number(violations[k], 3),
+            number(columns["change"][k], 3),
+            number(columns["kkt"][k], 2) if "kkt" in columns else "",
+            str(int(columns["evaluations"][k])),
+            duration(float(columns["seconds"][k])),
+        ]
+        for k in condensed(total)
+    ]
     output.table(rows)
     _say_failures(output, view)
 
 
-def _senses(view: "ResultView") -> list[str]:
-    """What each constraint bounds (`limit`, `equals`, `at_least`); empty where the case cannot be read any more."""
-    from mdstopo.case.text.errors import CaseError
-    from mdstopo.store.stored_case import case_of
-
-    try:
-        return [row.sense for row in case_of(view).constraints]
-    except CaseError:  # a file that it needs is gone
-        return []
-
-
-def _violation(excess: "NDArray[Any]", senses: list[str]) -> float:
-    """The largest amount by which an iterate breaks a constraint, each in its own unit; 0 where it keeps all of them,
-    NaN where it could not be evaluated.
-
-    excess (constraints,): values less bounds.
-    """
+def _violations(view: "ResultView") -> "NDArray[Any]":
+    """(K + 1,) by how much each iterate breaks the constraint that it breaks most, each in its own unit; 0 where it
+    keeps all of them, NaN where it could not be evaluated, or where the case cannot be read any more."""
     import numpy as np
 
-    broken = [
-        abs(by) if sense == "equals" else -by if sense == "at_least" else by
-        for by, sense in zip(excess.tolist(), senses, strict=True)
-    ]
-    return float(np.maximum(broken, 0.0).max())
+    from mdstopo.case.text.errors import CaseError
+    from mdstopo.limiting.compare import exceeded
+    from mdstopo.store.stored_case import case_of
+
+    excess = np.asarray(view.array("iterations/constraints"), dtype=np.float64)
+    try:
+        rows = case_of(view).constraints if excess.size else ()
+    except CaseError:  # a file that it needs is gone
+        rows = ()
+    broken = [np.maximum(exceeded(row.sense, excess[:, i]), 0.0) for i, row in enumerate(rows)]
+    return np.max(broken, axis=0) if broken else np.full(len(excess), np.nan)
 
 
 def _say_failures(output: Output, view: "ResultView") -> None:

@@ -33,23 +33,23 @@ _BOUNDS = {-1: "lower", 1: "upper"}
 class FitFile:
     """The result file of a fit, which is replaced as a whole whenever there is more to keep.
 
-    path: a place that this process may write. command: the command line, for the record. beside: the text of the fitted
-    case that stands beside it until this fit writes its own; None where there is none.
+    path: a place that this process may write. command: the command line, for the record. fitted_before: the text of the
+    fitted case that is there until this fit writes its own; None where there is none.
     """
 
-    def __init__(self, path: Path, problem: FitProblem, command: str = "", beside: str | None = None) -> None:
+    def __init__(self, path: Path, problem: FitProblem, command: str = "", fitted_before: str | None = None) -> None:
         self.path = path
         self._case = problem.case
         self._provenance = Provenance.collect(command)
         self._fixed = case_part(problem.case) | design_part(problem.case, problem.case.start)
         self._fixed |= _digests(problem)
         # a fit that is killed has to know the fitted case as one of its own when it goes on
-        self._beside: Datasets = {} if beside is None else {"fit/fitted_case": beside}
+        self._fitted_before: Datasets = {} if fitted_before is None else {"fit/fitted_case": fitted_before}
 
     def checkpoint(self, run: FitRun, notify: Callable[[str], None]) -> None:
         """Save in the middle; what keeps it from being saved is told."""
         try:
-            self._write("running", "running", datasets(run) | self._beside, ())
+            self._write("running", "running", datasets(run) | self._fitted_before, ())
         except WriteError as error:
             notify(f"no checkpoint: {error}")
 
@@ -58,7 +58,7 @@ class FitFile:
 
         fitted_case: the text of the case with the fitted numbers. warnings: sentences.
         """
-        part = datasets(run) | trajectory_part(_motions(run)) | self._beside
+        part = datasets(run) | trajectory_part(_motions(run)) | self._fitted_before
         if fitted_case is not None:
             part["fit/fitted_case"] = fitted_case
         self._write(run.status, run.reason, part, warnings)

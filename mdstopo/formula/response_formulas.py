@@ -11,7 +11,7 @@ from typing import NamedTuple
 from mdstopo.formula.calculus import ONE, call, derivative, is_number, substituted
 from mdstopo.formula.law_formulas import Group, by_place, group_of, limited, lowest_of
 from mdstopo.formula.parser import TIME, parse
-from mdstopo.formula.smooth_modes import smooth
+from mdstopo.formula.smooth_modes import has_bits, smooth
 from mdstopo.formula.tree import NUMBER, Expression, name, names_in
 
 #: group of the value and its slope by t; that of the smallest margin; the first of those with slopes by responses
@@ -24,15 +24,15 @@ class ResponseProgram(NamedTuple):
     """Groups of formulas of a response.
 
     parts: how many groups its slopes by responses take; those of a margin follow its value, which is a group with its
-    slope by t and whether it is evaluated. switches: how many kinks and jumps it has. timed: of each, whether it
-    changes by time alone, as that of step(t - 2).
+    slope by t and whether it is evaluated. switches: how many kinks and jumps it has. by_time_alone: of each, whether
+    the motion has no part in it, as in that of step(t - 2).
     is_timed: whether t is in it. is_norm: whether it is a root (times a number above 0), which has a kink at zero.
     """
 
     groups: tuple[Group, ...]
     parts: int
     switches: int
-    timed: tuple[bool, ...]
+    by_time_alone: tuple[bool, ...]
     is_timed: bool
     is_norm: bool
 
@@ -63,9 +63,8 @@ def response_program(
         groups.append(group_of((switch.margin, derivative(switch.margin, TIME), switch.relevant)))
         groups += _slopes(switch.margin, moving)
     parts = -(-responses // WIDTH)
-    by_motion = {*moving, *(word for margin in margins for word in names_in(margin) if word.startswith("bit "))}
-    timed = tuple(by_motion.isdisjoint(names_in(margin)) for margin in margins)
-    return ResponseProgram(tuple(groups), parts, len(margins), timed, TIME in names_in(root), _is_norm(root))
+    alone = tuple(not has_bits(margin) and set(moving).isdisjoint(names_in(margin)) for margin in margins)
+    return ResponseProgram(tuple(groups), parts, len(margins), alone, TIME in names_in(root), _is_norm(root))
 
 
 def _slopes(formula: Expression, moving: list[str]) -> list[Group]:

@@ -127,7 +127,7 @@ class _Switches:
             return one if margin.value >= 0.0 else other
         if one is other:
             return one
-        if not self.moving.intersection(names_in(margin)) and not _bits(margin):
+        if not self.moving.intersection(names_in(margin)) and not has_bits(margin):
             return choose(operation(">=", margin, ZERO), one, other)
         margin = self.scaled(margin)
         if margin in self.margins:
@@ -160,7 +160,8 @@ def _divided(margin: Expression, by: float) -> Expression:
     return multiply(number(1.0 / size), margin)
 
 
-def _bits(root: Expression) -> bool:
+def has_bits(root: Expression) -> bool:
+    """Whether sides of switches are in a formula."""
     return any(word.startswith("bit ") for word in names_in(root))
 
 
@@ -178,7 +179,7 @@ def _reached(formulas: tuple[Expression, ...], margins: tuple[Expression, ...]) 
 def _note(root: Expression, reached: Expression, relevant: list[Expression]) -> None:
     """Add where a formula needs switches, if it is evaluated itself where `reached` is 1."""
     for part, way in ways_to((root, reached)).items():
-        if part.operator == "if" and part.operands[0].operands[1] is HALF and _bits(part.operands[0]):
+        if part.operator == "if" and part.operands[0].operands[1] is HALF and has_bits(part.operands[0]):
             place = int(part.operands[0].operands[0].word.removeprefix("bit "))
             relevant[place] = either_of(relevant[place], way)
 

@@ -95,9 +95,15 @@ def violations(case: Case, view: ResultView) -> FloatArray:
     excess = np.asarray(view.array("iterations/constraints"), dtype=np.float64)
     most = np.full(len(excess), -np.inf)
     for i, row in enumerate(case.constraints):
-        over = {"limit": excess[:, i], "at_least": -excess[:, i], "equals": np.abs(excess[:, i])}[row.sense]
-        most = np.maximum(most, over / (abs(row.bound) or 1.0))
+        most = np.maximum(most, exceeded(row.sense, excess[:, i]) / (abs(row.bound) or 1.0))
     return most
+
+
+def exceeded(sense: str, excess: FloatArray) -> FloatArray:
+    """By how much values break a bound, positive where they do, in their own unit. excess: the values less the bound;
+    sense: what it asks for, `limit`, `at_least` or `equals`."""
+    over: FloatArray = {"limit": excess, "at_least": -excess, "equals": np.abs(excess)}[sense]
+    return over
 
 
 def of_last_stage(case: Case, view: ResultView) -> NDArray[np.bool_]:

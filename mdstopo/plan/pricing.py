@@ -88,8 +88,8 @@ def price(case: Case, of: Problem, x: Floats, count: int | None = None) -> Price
     gradients = gradients_of(sample)
     built = rows @ gradients + linear @ problem.linear.A
     scale = abs(sample.objective) or 1.0
-    room = np.where(built < 0.0, problem.upper - x, x - problem.lower)
-    unsettled = float((np.abs(built) * room).max(initial=0.0)) / scale
+    way = np.where(built < 0.0, problem.upper - x, x - problem.lower)
+    unsettled = float((np.abs(built) * way).max(initial=0.0)) / scale
     seen, best, together = 0, 0.0, 0.0
     pairs: dict[str, Pairs] = {}
     gains: dict[str, Floats] = {}

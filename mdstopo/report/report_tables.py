@@ -9,7 +9,7 @@ from mdstopo.case.design.stages import stage_count
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case
 from mdstopo.case.responses.response_units import constrained, unit_of_bound, unit_of_value
-from mdstopo.limiting.compare import kept_iterates, of_last_stage, violations
+from mdstopo.limiting.compare import exceeded, kept_iterates, of_last_stage, violations
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.scenery import Floats
 from mdstopo.plots.source import Source
@@ -77,7 +77,7 @@ def constraint_rows(source: Source) -> list[dict[str, Any]]:
         start, end = float(excess[0, i]), float(excess[best, i])
         if abs(end) <= NOTHING * abs(row.bound):
             end = 0.0
-        margin = {"limit": -end, "at_least": end, "equals": -abs(end)}[row.sense]
+        margin = -float(exceeded(row.sense, np.array(end)))
         found.append(
             {"what": constrained(source.case, row), "sense": row.sense, "bound": float(row.bound),
              "unit": unit_of_bound(row), "start": start + row.bound, "best": end + row.bound, "margin": margin}

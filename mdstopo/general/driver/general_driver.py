@@ -82,9 +82,8 @@ DAMPING = 1
 #: `_plain_arguments` `count` and `window`
 TANGENT_AT = 4
 COUNT_AT, WINDOW_AT = 6, 11
-#: numbers in the arrays for steps (128 MB) from which on these grow without what only gradients need, where none are
-#: wanted
-SMALL = 2**24
+#: from so many numbers on (128 MB) the arrays for steps grow without what only gradients need, where none are wanted
+LARGE = 2**24
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -109,7 +108,7 @@ class GeneralDriver:
     def __init__(self, case: Case, scene: GeneralScene, options: DriverOptions) -> None:
         self.case = case
         self.scene = scene
-        self.method = method = options.method
+        self.method = options.method
         model = scene.model
         #: coordinates and velocities at the start: as stated, or as assembled
         self._start = model.q0, model.v0
@@ -165,7 +164,7 @@ class GeneralDriver:
         self._entry: Entries | None = None
         self._message = ""
         self._allowed = MAX_STEPS
-        self._make_room(method.steps, method.stages, 64, self._kept_for_gradients)
+        self._make_first_room()
         if options.fits:
             self._fit()
         #: at rest, where the case asks for it
@@ -238,19 +237,20 @@ class GeneralDriver:
         self.room_ints = np.zeros(ints, dtype=np.int64)
         self.ready = Ready()  # prepared calls hold the arrays of before
 
-    def _make_room_for_tangents(self) -> None:
-        """Room for what gradients need, where that of before has grown without."""
-        if self.limits[KEPT] == NOTHING:
-            self._make_room(self.method.steps, self.method.stages, 64, self._kept_for_gradients)
+    def _make_first_room(self) -> None:
+        """Room for a short motion, with all that gradients need."""
+        self._make_room(self.method.steps, self.method.stages, 64, self._kept_for_gradients)
 
     def _grow(self, tangent: bool) -> bool:
         """Make twice the room, or as much as memory has; False where that is hardly more.
 
         tangent: whether gradients are wanted. Where they are not, what they need takes no more room: it is most of it.
         """
-        explicit = self.method.kind.explicit
-        kept = NOTHING if explicit and not tangent and len(self.room) > SMALL else int(self.limits[KEPT])
-        factor = 2.0 if kept != self.limits[KEPT] else room_factor(len(self.room))
+        kept = int(self.limits[KEPT])
+        if self.method.kind.explicit and not tangent and kept != NOTHING and len(self.room) > LARGE:
+            kept, factor = NOTHING, 2.0  # which takes less than before
+        else:
+            factor = room_factor(len(self.room))
         if factor == 1.0:
             return False
         steps, stages, events = (int(factor * int(size)) for size in self.limits[1:4])
@@ -720,8 +720,8 @@ class GeneralDriver:
         self.ints, self.floats = (
             self.pack(landed(self.with_start(), quadrature_breakpoints)) if quadrature_breakpoints else self._packed
         )
-        if tangent:
-            self._make_room_for_tangents()
+        if tangent and self.limits[KEPT] == NOTHING:
+            self._make_first_room()
         while True:
             self.work.fill(0)
             code, count, self.events, time = self.ready.often(

@@ -37,7 +37,7 @@ def moving_switches(driver: DriverWithRun, j: int) -> list[int]:
     """The switches of response j that change by the motion; those that change by time alone do so where segments
     end."""
     response = driver.scene.responses[j]
-    return [k for k, timed in enumerate(program_of(response).timed) if not timed] if response.of else []
+    return np.flatnonzero(~np.array(program_of(response).by_time_alone, dtype=bool)).tolist() if response.of else []
 
 
 def _cuts(driver: DriverWithRun, j: int, t: FloatArray, places: FloatArray) -> dict[int, list[float]]:

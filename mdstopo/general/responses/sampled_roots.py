@@ -90,9 +90,7 @@ def roots_on_grid(
             times[k] += BEHIND * (times[k + 1] - times[k])
             values[k] = exact(times[k : k + 1])[0]
     widths = np.diff(times)
-    turns = (values[:-1] >= 0.0) != (values[1:] >= 0.0)
-    dips = (values[:-1] * rates[:-1] < 0.0) & (values[1:] * rates[1:] > 0.0)
-    for k in np.flatnonzero(turns | dips).tolist():
+    for k in np.flatnonzero(may_vanish(values, rates)).tolist():
         span = float(times[k]), float(times[k + 1])
         ends = float(values[k]), float(values[k + 1])
         slopes = float(rates[k] * widths[k]), float(rates[k + 1] * widths[k])

@@ -27,7 +27,7 @@ def switch_times(
         if response.of and not reduction.at_end:
             program = program_of(response)
             numbers = np.array([*[0.0] * len(response.of), *(value for _, value in response.parameters)])
-            for switch in np.flatnonzero(program.timed).tolist():
+            for switch in np.flatnonzero(program.by_time_alone).tolist():
                 found += _roots(program, numbers, switch, (load_case.start, load_case.end))
     return found
 
