@@ -35,9 +35,8 @@ PATIENCE = 8
 RESETS, RESET_SHRINK = 3, 0.2
 #: share of the row's reach in the box that is rounding of the subproblem
 ROUNDING = 1e-8
-#: the least and the highest penalty, in the first one, and what is left of one at least from step to step. Where what
-#: is left of a violation is rounding, no penalty takes it away, and with ever higher ones subproblems cannot be solved
-LEAST_PENALTY, HIGHEST_PENALTY, PENALTY_FALL = 1e-2, 1e6, 0.5
+#: the least penalty, in the first one, and what is left of one at least from step to step
+LEAST_PENALTY, PENALTY_FALL = 1e-2, 0.5
 #: what is left of the concavity from trial to trial
 CONCAVITY_FALL = 0.9
 #: iterates whose violation has not fallen to this share of what it was, and of which their rows do not promise it
@@ -231,8 +230,7 @@ class BundleMethod:
         own = state.bundle.subset(state.bundle.own)
         steepest = float(own.steepest[own.group == 0].max(initial=0.0))
         if np.isnan(state.kkt):
-            first = self.first_penalty(own) if len(state.penalty) else 0.0
-            penalty = np.minimum(np.maximum(state.penalty, first) * BOUND, HIGHEST_PENALTY * first)
+            penalty = np.maximum(state.penalty, self.first_penalty(own) if len(state.penalty) else 0.0) * BOUND
             unit = steepest if state.restoring else residual_unit(state, _steepness_of_highest(own), steepest)
             state.kkt = self.model.residual(own, state.alpha, penalty, unit)
         reach = state.trust, self.settings.number("move_limit")
@@ -351,7 +349,6 @@ class BundleMethod:
         trial = around.solve(rows, state.penalty)
         if not len(state.penalty):
             return trial
-        first = self.first_penalty(rows)
         reach = around.reach(rows.subset(rows.group > 0))
         tiny = max(NOTHING * self.settings.tolerance, ROUNDING * float(reach.max(initial=0.0)))
 
@@ -366,14 +363,15 @@ class BundleMethod:
                 if violation(trial.levels) <= enough:
                     break
                 violated = trial.levels[1:] > tiny / len(state.penalty)
-                raised = np.where(violated, RAISE * state.penalty, state.penalty)
-                state.penalty = np.minimum(raised, HIGHEST_PENALTY * first)
+                state.penalty = np.where(violated, RAISE * state.penalty, state.penalty)
                 trial = around.solve(rows, state.penalty)
         carried = np.bincount(rows.group, weights=trial.multipliers, minlength=len(here))[1:]
         state.penalty = np.where(
             trial.levels[1:] > tiny,
             state.penalty,
-            np.maximum(np.maximum(MARGIN * carried, PENALTY_FALL * state.penalty), LEAST_PENALTY * first),
+            np.maximum(
+                np.maximum(MARGIN * carried, PENALTY_FALL * state.penalty), LEAST_PENALTY * self.first_penalty(rows)
+            ),
         )
         return trial
 

@@ -41,6 +41,9 @@ NULL_STEP_SHRINK = 0.7
 NEAR = 1e-3
 #: a violation below this share of the tolerance is none
 NOTHING = 1e-3
+#: bounds of multipliers, in largest gradient entries of the objective, with which the residual's subproblem is solved
+#: where it cannot be with higher ones
+HIGHEST = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,8 +370,10 @@ def _multipliers_of(
     lines: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float
 ) -> tuple[float, Floats, Floats]:
     """The multipliers of the proximal step of these lines, and the residual with them, as `multipliers` has them."""
-    flat = Curvature.diagonal_of(np.full(len(x), steepest))
-    trial = subproblem(lines, x, space, (space.lower, space.upper), penalty, flat)
+    flat, whole = Curvature.diagonal_of(np.full(len(x), steepest)), (space.lower, space.upper)
+    trial = subproblem(lines, x, space, whole, penalty, flat)
+    if not trial.solved:  # of violations that are rounding penalties rise without end
+        trial = subproblem(lines, x, space, whole, np.minimum(penalty, HIGHEST * steepest), flat)
     found = residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
     return found, trial.multipliers, trial.linear
 
