@@ -211,7 +211,24 @@ def subproblem(
       curvature: B, the matrix of the quadratic term.
 
     Fixed variables and linear rows without a free one are left out; the trial keeps box and linear rows to rounding.
+    In a very small box levels that are far apart, and vectors far longer than they change, take the digits away. What
+    cannot be solved for it is solved with the rows alone that matter in the box.
     """
+    trial = _subproblem_of(bundle, x, space, box, penalty, curvature)
+    if trial.solved:
+        return trial
+    kept, rows = bundle.relevant(np.maximum(box[1] - x, x - box[0]))
+    trial = _subproblem_of(rows, x, space, box, penalty, curvature)
+    multipliers = np.zeros(len(bundle))
+    multipliers[kept] = trial.multipliers
+    levels = largest_of_groups(bundle.values_at(trial.x - x), bundle.group, len(penalty) + 1)
+    return replace(trial, multipliers=multipliers, levels=levels)
+
+
+def _subproblem_of(
+    bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], penalty: Floats, curvature: Curvature
+) -> Trial:
+    """Solve the model of these rows, as `subproblem` has it."""
     lower, upper = box[0] - x, box[1] - x
     free = upper > lower
     d, linear = np.zeros(len(x)), np.zeros(len(space.linear))
