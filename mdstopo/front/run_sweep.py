@@ -22,7 +22,7 @@ from mdstopo.plan.priced_designs import in_case, with_all
 from mdstopo.plan.solve_task import Found, case_key, failed
 from mdstopo.plan.stored_tasks import read_tasks, tasks_part
 from mdstopo.session.compiling_apart import compile_apart
-from mdstopo.session.shortfall import of_many
+from mdstopo.session.shortfall import stalled_runs
 from mdstopo.starts.callbacks import ignore, never
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
@@ -236,7 +236,7 @@ class _Sweep:
     def stalled(self) -> tuple[str, ...]:
         """The warning about runs that stalled; their tolerances may differ."""
         found = [self.solved[key] for key in self.runs]
-        return of_many([(each.status, each.kkt) for each in found], "runs")
+        return stalled_runs([(each.status, each.kkt) for each in found], "runs")
 
     def verdict(self) -> tuple[RunStatus, str]:
         """How the runs have ended."""

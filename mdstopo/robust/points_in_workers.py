@@ -13,7 +13,7 @@ from mdstopo.robust.ensemble import Ensemble, Part
 from mdstopo.robust.sample import Sample, design_sample
 from mdstopo.robust.sampled_case import evaluator_at, nominal_case, nominal_evaluator
 from mdstopo.robust.trial import Trial, tried
-from mdstopo.starts.evaluator_interface import even, problem_of
+from mdstopo.starts.evaluator_interface import equal_weights, problem_of
 from mdstopo.starts.getting_ready import get_ready
 from mdstopo.workers.worker_pool import Lost, Parent, Perform, WorkerError, WorkerPool
 
@@ -76,7 +76,7 @@ def open_points(case: Case) -> Perform:
     nominal = nominal_case(case)
     engine = nominal_evaluator(case)
     # the kernels in the one order in which every process loads them
-    get_ready(nominal, engine, problem_of(engine, even(nominal)), None)
+    get_ready(nominal, engine, problem_of(engine, equal_weights(nominal)), None)
     sample = design_sample(case.uncertainty)
     kept: dict[tuple[int, ...], Ensemble] = {}
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.case.responses.columns import point_columns, reaction_columns, state_columns
+from mdstopo.store.json_values import json_value
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.whole_front import whole_front
 
@@ -162,12 +163,6 @@ def as_json(view: ResultView) -> Iterator[str]:
         yield f"{separator}  {json.dumps(path)}: {json.dumps(text)}"
         separator = ",\n"
     for path, array in sorted(view.arrays.items()):
-        yield f"{separator}  {json.dumps(path)}: {json.dumps(_plain(array.tolist()))}"
+        yield f"{separator}  {json.dumps(path)}: {json.dumps(json_value(array))}"
         separator = ",\n"
     yield "\n }\n}\n"
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

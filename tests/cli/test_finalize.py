@@ -20,7 +20,7 @@ from mdstopo.finalize.document import _versions, content_of, final_content
 from mdstopo.finalize.equilibria import _Distance
 from mdstopo.finalize.finalize_design import finalize, ready
 from mdstopo.finalize.keep import chosen, places, restricted
-from mdstopo.finalize.scaled_laws import sized
+from mdstopo.finalize.scaled_laws import scaled_law
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 
 SPRINGS = """\
@@ -125,7 +125,7 @@ def test_a_sized_law_has_its_forces_scaled_and_nothing_else(name: str) -> None:
             given[key] = 3.0
     given |= {"curve": {"curve": np.array([[-1.0, -2.0], [1.0, 4.0]])}}.get(name, {})
     given |= {"table": {"table": Table(np.array([0.0, 1.0]), np.array([[2.0], [4.0]]))}}.get(name, {})
-    found = sized(LAWS[name](**given), 0.25)
+    found = scaled_law(LAWS[name](**given), 0.25)
     assert found.pop("type") == name
     for key, value in found.items():
         if key in ("curve", "table"):

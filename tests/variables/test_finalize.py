@@ -17,7 +17,7 @@ from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.finalize_design import ready
 from mdstopo.finalize.keep import chosen, kept_values, one_alpha, places, restricted
-from mdstopo.finalize.sized_laws import bound_of
+from mdstopo.finalize.parameter_values import bound_of
 
 #: a stiffness for all, which costs; springs and energy alone, so that the final case needs no general kernels
 STIFFNESS = """\
