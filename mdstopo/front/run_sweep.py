@@ -31,6 +31,7 @@ from mdstopo.store.checkpoint import INTERVAL, Checkpointer
 from mdstopo.store.contents import Datasets, case_part
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
+from mdstopo.store.set_keys import set_keys
 from mdstopo.store.store_errors import WriteError
 from mdstopo.store.writing import write_result
 from mdstopo.workers.worker_pool import Lost
@@ -288,7 +289,8 @@ class _Sweep:
                 part |= {f"variables/{i}/{name}": values for name, values in space.named(design).items()}
         datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
         datasets |= tasks_part(tasks, self.base, "sweep/tasks")
-        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, {}, self.warnings)
+        settings = set_keys(self.base)
+        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, settings, self.warnings)
 
 
 def shortest(value: float) -> str:
