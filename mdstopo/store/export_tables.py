@@ -12,6 +12,7 @@ import numpy as np
 from mdstopo.case.model import Case
 from mdstopo.case.responses.columns import point_columns, reaction_columns, state_columns
 from mdstopo.store.json_values import json_value
+from mdstopo.store.labels import WITHOUT_POINTS
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.whole_front import whole_front
 
@@ -28,7 +29,7 @@ def tables(view: ResultView, case: Case) -> dict[str, Table]:
     if "pareto/objectives" in view.arrays:
         front = {key: value for key, value in whole_front(view).items() if "/" not in key}
         texts = {key: front.pop(key) for key in ("status", "reason")}
-        front = {key: value for key, value in front.items() if key not in ("alpha", "ends", "ends_alpha")}
+        front = {key: value for key, value in front.items() if key != "alpha" and key not in WITHOUT_POINTS}
         front |= {key: np.array(value) for key, value in texts.items() if value}
         per_name = dict.fromkeys(("weights", "objectives", "utopia", "maxima"), names)
         found["front"] = _columns("point", front, per_name, "weights")
