@@ -234,8 +234,20 @@ def _watched_pairs(names: tuple[str, ...], shared: Members) -> tuple[IndexArray,
         q = shared.member[2:4, start:stop]
         shortest[pair] = min(shortest[pair], length)
         reach[pair] = max(reach[pair], float(np.sqrt(np.max(np.einsum("ij,ij->j", q, q)))))
-    reach[reach == 0.0] = 1.0
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2), reach, shortest
+    longest = float(shortest[np.isfinite(shortest)].max(initial=0.0))
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2), with_arms(reach, longest), shortest
+
+
+def with_arms(reach: FloatArray, size: float) -> FloatArray:
+    """`Model.reach` (n_pair,) where pairs without an arm have that of the pair with the longest one, m.
+
+    What measures turns has to grow with the scene: a length of its own would tie accuracy to the unit of length.
+
+    reach (n_pair,): 0 where all attachment points are centres of mass.
+    size: what they get where no pair has an arm; 1 m if it is 0, too.
+    """
+    longest = float(reach.max(initial=0.0))
+    return np.where(reach > 0.0, reach, longest or size or 1.0)
 
 
 def _skipped(

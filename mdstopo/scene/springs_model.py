@@ -47,7 +47,9 @@ NO_CHUNK = np.zeros((0, 3), dtype=np.int64)
 StartCoordinates = Annotated[FloatArray, Field("n", "coordinates at the start: moved since home (m, rad)")]
 StartVelocities = Annotated[FloatArray, Field("n", "velocities at the start (m/s, rad/s)")]
 Home = Annotated[FloatArray, Field(f"n // 3, {HOME}", "x, y, psi of each body where its q is zero; cos, sin of psi")]
-Reach = Annotated[FloatArray, Field("n_pair", "largest distance of an attachment point from its centre of mass (m)")]
+Reach = Annotated[
+    FloatArray, Field("n_pair", "largest distance of an attachment point from its centre of mass; see `with_arms` (m)")
+]
 Power = Annotated[FloatArray, Field("n_block", "mu of Eq. 12")]
 Force = Annotated[
     FloatArray, Field("n_seg, n, 2", "generalised load at the segment's start, its slope; with gravity (N, N m)")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -16,6 +18,8 @@ __all__ = ["in_python"]
 pytestmark = pytest.mark.usefixtures("in_python")
 TABLE, S, N, N_Q = runge_kutta_tables()[GENERAL], STAGES[GENERAL], 12, 14
 RANDOM = np.random.default_rng(1)
+#: of a scene, which tells how short a brief step is
+SECOND = SimpleNamespace(times=np.array([0.0, 1.0]))
 #: a made-up balance: accelerations as smooth functions of coordinates and velocities
 BY_Q, BY_V = 0.8 * RANDOM.normal(size=(N, N_Q)), 0.4 * RANDOM.normal(size=(N, N))
 START = SPATIAL.retract(np.tile(SPATIAL.at_home, 2), RANDOM.normal(size=N))
@@ -126,14 +130,15 @@ def test_how_a_shift_changes_with_the_coordinates_at_its_ends() -> None:
         same(x, expected)
 
 
-def test_derivatives_of_the_cubic_between_two_states() -> None:
-    c, h = 0.3, 0.37
+@pytest.mark.parametrize("h", [0.37, 1e-9])
+def test_derivatives_of_the_cubic_between_two_states(h: float) -> None:
+    c = 0.3
     random = np.random.default_rng(3)
     ends = START, SPEED, SPATIAL.retract(START, 0.3 * random.normal(size=N)), random.normal(size=N)
 
     def cubic(*given: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         q, v = np.empty(N_Q), np.empty(N)
-        KERNELS.cubic(None, c, h, *given, q, v)
+        KERNELS.cubic(SECOND, c, h, *given, q, v)
         return q, v
 
     here, _ = cubic(*ends)
@@ -147,12 +152,12 @@ def test_derivatives_of_the_cubic_between_two_states() -> None:
         blocks.append(by_numbers(at, ends[k]) if k % 2 else by_q(at, ends[k], N))
     bar_q, bar_v = random.normal(size=(2, N))
     bars = np.empty((4, N))
-    KERNELS.cubic_vjp(None, c, h, *ends, bar_q, bar_v, *bars)
+    KERNELS.cubic_vjp(SECOND, c, h, *ends, bar_q, bar_v, *bars)
     for block, bar in zip(blocks, bars, strict=True):
         same(bar, block.T @ np.concatenate([bar_q, bar_v]), 1e-8)
     changes = random.normal(size=(4, N))
     dq, dv = changes[0].copy(), changes[1].copy()
-    KERNELS.cubic_jvp(None, c, h, *ends, dq, dv, changes[2], changes[3])
+    KERNELS.cubic_jvp(SECOND, c, h, *ends, dq, dv, changes[2], changes[3])
     expected = sum(block @ change for block, change in zip(blocks, changes, strict=True))
     same(np.concatenate([dq, dv]), expected, 1e-8)
 
@@ -164,7 +169,7 @@ def test_a_quintic_has_the_states_and_accelerations_of_both_ends() -> None:
 
     def at(c: float) -> tuple[np.ndarray, np.ndarray]:
         q, v = np.empty(N_Q), np.empty(N)
-        KERNELS.quintic(None, c, 0.4, START, SPEED, a0, q1, v1, a1, q, v)
+        KERNELS.quintic(SECOND, c, 0.4, START, SPEED, a0, q1, v1, a1, q, v)
         return q, v
 
     for c, q, v, a in ((0.0, START, SPEED, a0), (1.0, q1, v1, a1)):
@@ -173,6 +178,19 @@ def test_a_quintic_has_the_states_and_accelerations_of_both_ends() -> None:
         same(by_numbers(lambda x, c=c: at(c + x[0])[1], np.zeros(1))[:, 0] / 0.4, a, 1e-8)
     middle = by_numbers(lambda x: SPATIAL.difference(at(0.4 + x[0])[0], at(0.4)[0]), np.zeros(1))[:, 0] / 0.4
     same(middle, at(0.4)[1], 1e-8)
+
+
+def test_velocities_in_a_brief_step_are_between_those_of_its_ends() -> None:
+    """Rounding of the coordinates, which is more than bodies move by in it, does not show in them."""
+    random = np.random.default_rng(8)
+    v1, a0, a1, q, v = SPEED + 1e-6 * random.normal(size=N), *random.normal(size=(2, N)), np.empty(N_Q), np.empty(N)
+    far = START.copy()
+    far[[0, 1, 2, 7, 8, 9]] += 100.0
+    for c in (0.0, 0.2, 0.7, 1.0):
+        KERNELS.cubic(SECOND, c, 1e-16, far, SPEED, far, v1, q, v)
+        same(v, (1.0 - c) * SPEED + c * v1, 1e-14)
+        KERNELS.quintic(SECOND, c, 1e-16, far, SPEED, a0, far, v1, a1, q, v)
+        same(v, (1.0 - c) * SPEED + c * v1, 1e-14)
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-3, 0.1, 0.316, 0.317, 1.0, 3.0])

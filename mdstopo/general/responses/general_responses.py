@@ -1036,7 +1036,7 @@ def _inerter_slopes(model, member_state, segment, who, group, sign, q, v, a, bar
         for which in range(2):
             for c in range(pair_freedoms(model)):
                 d = place_in_pair(model, pair, c)
-                size = 2e-3 * max(model.reach[pair], 1e-3) if which == 0 else 1e-2 * (0.1 + abs(v[d]))
+                size = 2e-3 * model.reach[pair] if which == 0 else 1e-2 * (0.1 + abs(v[d]))
                 if which == 0 and is_turning(model, c):
                     size = 2e-3
                 slope = 0.0

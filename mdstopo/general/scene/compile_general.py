@@ -17,6 +17,7 @@ from mdstopo.general.scene.dimension import Dimension, Frames, Pairs, dimension_
 from mdstopo.general.scene.driven_integrals import integration_times
 from mdstopo.general.scene.drives import Drives, drives, drives_all, motion_times
 from mdstopo.general.scene.expression_rows import expression_codes, expression_data
+from mdstopo.general.scene.extent import size_of
 from mdstopo.general.scene.layout import arrange
 from mdstopo.general.scene.timed_loads import kink_times, mistake_of, parts_of, timed_loads
 from mdstopo.general.scene.timed_switches import switch_times
@@ -36,7 +37,7 @@ from mdstopo.mechanics.kinematics.timed import ADDRESS
 from mdstopo.mechanics.laws import law_table
 from mdstopo.mechanics.laws.spring import NEAR_AT
 from mdstopo.scene.bodies import distances, stands_as
-from mdstopo.scene.compile_scene import near_of
+from mdstopo.scene.compile_scene import near_of, with_arms
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.grid_members import row_of, short_row_of
 from mdstopo.scene.origin import ends_of
@@ -119,8 +120,8 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
             pairs.setdefault((len(names) - 1, i), len(pairs))
     pair = np.array(list(pairs), dtype=np.int64).reshape(-1, 2)
     reach = _reach(case, dimension, index, pairs, members)
-    for p, far in zip(contact_pair.tolist(), dimension.reaches(contact).tolist(), strict=True):
-        reach[p] = max(reach[p], far)
+    np.maximum.at(reach, contact_pair, dimension.reaches(contact))
+    reach = with_arms(reach, size_of(case))
     loads = dimension.loads(load_case, index, times, frames)
     timed = timed_loads(parts_of(load_case, lambda load: dimension.timed(load, frames), index), times)
     responses, reductions = evaluated_in(case, load_case.name)
@@ -340,7 +341,7 @@ def _joints(
 def _reach(
     case: Case, dimension: Dimension, index: dict[str, int], pairs: Pairs, members: dict[str, Any]
 ) -> FloatArray:
-    """(n_pair,): the largest distance of an attachment point from its centre of mass, m; 1 where it would be zero.
+    """(n_pair,): the largest distance of an attachment point from its centre of mass, m.
 
     Of members those on the second body of the pair count, of joints and bushings those on both.
     """
@@ -354,7 +355,6 @@ def _reach(
         pair = pairs[a, b]
         ends = distances(np.array([tie.at_second, tie.at_first], dtype=np.float64))
         reach[pair] = max(reach[pair], *ends.tolist())
-    reach[reach == 0.0] = 1.0
     return reach
 
 

@@ -419,7 +419,7 @@ def end_jvp(model, table, s, h, q, v, changes, dq, dv):
 
 
 def cubic(model, c, h, q0, v0, q1, v1, q, v):
-    """The cubic through both ends of a step, and its derivative.
+    """The cubic through both ends of a step, and its derivative; of a brief one what `brief_steps` tells.
 
     In:
       model: the compiled scene.
@@ -458,7 +458,7 @@ def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
 
 
 def quintic(model, c, h, q0, v0, a0, q1, v1, a1, q, v):
-    """The quintic through both ends of a step with their accelerations, and its derivative.
+    """The quintic through both ends of a step with their accelerations, and its derivative; of a brief step the cubic.
 
     In:
       model: the compiled scene.

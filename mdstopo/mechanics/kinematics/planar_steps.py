@@ -8,6 +8,7 @@ and all derivatives of it are its coefficients.
 """
 
 from mdstopo.compiler.jit import part
+from mdstopo.mechanics.kinematics.brief_steps import evenly_jvp, evenly_vjp, is_brief, shares_of_way
 
 #: planes of a method's table (`integrators.runge_kutta_tables`), and rows of its last one
 BY_STAGE, BY_RATE, VECTORS = range(3)
@@ -173,6 +174,12 @@ def hermite(c):
 @part
 def cubic(model, c, h, q0, v0, q1, v1, q, v):
     """The cubic through both ends of a step; see `kinematics_interface.cubic`."""
+    if is_brief(model, h):
+        first, last = shares_of_way(c, h)
+        for d in range(q.shape[0]):
+            q[d] = q0[d] + first * v0[d] + last * v1[d]
+            v[d] = v0[d] + c * (v1[d] - v0[d])
+        return
     a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
     for d in range(q.shape[0]):
         q[d] = a0 * q0[d] + a1 * q1[d] + h * (b0 * v0[d] + b1 * v1[d])
@@ -182,6 +189,9 @@ def cubic(model, c, h, q0, v0, q1, v1, q, v):
 @part
 def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q, end_v):
     """The cotangents of both ends of a cubic; see `kinematics_interface.cubic_vjp`."""
+    if is_brief(model, h):
+        evenly_vjp(c, h, bar_q, bar_v, start_q, start_v, end_q, end_v)
+        return
     a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
     for d in range(bar_q.shape[0]):
         start_q[d] = a0 * bar_q[d] + da0 / h * bar_v[d]
@@ -193,6 +203,9 @@ def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q
 @part
 def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
     """The change of a cubic; see `kinematics_interface.cubic_jvp`."""
+    if is_brief(model, h):
+        evenly_jvp(c, h, dq, dv, end_dv)
+        return
     a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
     for d in range(dq.shape[0]):
         start = dq[d]
@@ -203,6 +216,9 @@ def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
 @part
 def quintic(model, c, h, q0, v0, a0, q1, v1, a1, q, v):
     """The quintic through both ends of a step; see `kinematics_interface.quintic`."""
+    if is_brief(model, h):
+        cubic(model, c, h, q0, v0, q1, v1, q, v)
+        return
     for d in range(q.shape[0]):
         j = q1[d] - q0[d] - h * (v0[d] + 0.5 * h * a0[d])
         w = h * (v1[d] - v0[d] - h * a0[d])

@@ -13,6 +13,7 @@ Backwards, with u_i the cotangent of the turn of stage i, g_i that of its turnin
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.mechanics.kinematics.brief_steps import evenly_jvp, evenly_vjp, is_brief, shares_of_way
 from mdstopo.mechanics.kinematics.planar_steps import BY_RATE, BY_STAGE, END, END_RATE, NODES, VECTORS, hermite
 from mdstopo.mechanics.kinematics.rotations import (
     exponential,
@@ -471,11 +472,36 @@ def _cubic_vector(c, h, way, first, last):
 
 
 @kernel
+def _evenly(c, h, q0, v0, v1, q, v):
+    """The cubic of a brief step, whose turns are so small that their rates are angular velocities.
+
+    c, h: fraction of the step, and its length (s).
+    q0 (n_q,), v0, v1 (n,): coordinates at its start, velocities at both ends.
+    q (n_q,), v (n,): out.
+    """
+    first, last = shares_of_way(c, h)
+    for body in range(v.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        for d in (FREEDOMS * body, FREEDOMS * body + 3):
+            one = vector_at(v0, d)
+            two = vector_at(v1, d)
+            way = plus(times(first, one), times(last, two))
+            put(v, d, plus(one, times(c, minus(two, one))))
+            if d == FREEDOMS * body:
+                put(q, i, plus(vector_at(q0, i), way))
+            else:
+                put_quaternion(q, i + 3, turn_by(quaternion_at(q0, i + 3), way))
+
+
+@kernel
 def cubic(model, c, h, q0, v0, q1, v1, q, v):
     """The cubic through both ends of a step; see `kinematics_interface.cubic`.
 
     Turns follow the cubic p of the rotation vector from the start: q = q_0 exp(p), omega = J(p) p'.
     """
+    if is_brief(model, h):
+        _evenly(c, h, q0, v0, v1, q, v)
+        return
     a0, b0, a1, b1, _, db0, da1, db1 = hermite(c)
     for body in range(v.shape[0] // FREEDOMS):
         i = COORDINATES * body
@@ -495,6 +521,9 @@ def cubic(model, c, h, q0, v0, q1, v1, q, v):
 @kernel
 def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q, end_v):
     """The cotangents of both ends of a cubic; see `kinematics_interface.cubic_vjp`."""
+    if is_brief(model, h):
+        evenly_vjp(c, h, bar_q, bar_v, start_q, start_v, end_q, end_v)
+        return
     a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
     for body in range(bar_q.shape[0] // FREEDOMS):
         i = COORDINATES * body
@@ -525,6 +554,9 @@ def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q
 @kernel
 def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
     """The change of a cubic; see `kinematics_interface.cubic_jvp`."""
+    if is_brief(model, h):
+        evenly_jvp(c, h, dq, dv, end_dv)
+        return
     a0, b0, a1, b1, _, db0, da1, db1 = hermite(c)
     for body in range(dq.shape[0] // FREEDOMS):
         i = COORDINATES * body
@@ -554,6 +586,9 @@ def quintic(model, c, h, q0, v0, a0, q1, v1, a1, q, v):
     Turns follow the quintic of the rotation vector from the start, whose rates at the end are J(t)^-1 omega and the
     derivative of that.
     """
+    if is_brief(model, h):
+        _evenly(c, h, q0, v0, v1, q, v)
+        return
     for body in range(v.shape[0] // FREEDOMS):
         i = COORDINATES * body
         d = FREEDOMS * body
