@@ -22,7 +22,7 @@ from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.conic import Program, Solution, solve
 from mdstopo.optimizer.curvature import FEW, Curvature, learnt
 from mdstopo.optimizer.nearest_feasible import repair
-from mdstopo.optimizer.problem import Bools, Floats, Ints, LinearRows, largest_of_groups
+from mdstopo.optimizer.problem import Bools, Floats, Ints, LinearRows, largest_of_groups, scale_of
 from mdstopo.optimizer.stack import Slopes, Stack, joined
 
 #: what violations cost, in multipliers of their limits: more than one, or the merit would be least where limits are
@@ -81,6 +81,11 @@ class FeasibleSet:
     upper: Floats
     linear: LinearRows
     range: Floats
+
+    @property
+    def scale(self) -> float:
+        """What moves of variables are judged by (`scale_of`)."""
+        return scale_of(self.lower, self.upper)
 
 
 class SecantPairs(NamedTuple):
@@ -146,7 +151,7 @@ class DenseModel:
         space = self.space
         far = np.minimum(reach[1], reach[0] * space.range)
         box = np.maximum(space.lower, x - far), np.minimum(space.upper, x + far)
-        return _DenseAround(x, space, box, curvature_of(pairs, steepest, space.range))
+        return _DenseAround(x, space, box, curvature_of(pairs, space.scale * steepest, space.range))
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual at x; see `RowModel.residual`."""
@@ -351,7 +356,8 @@ def lower_bound(rows: Bundle, trial: Trial, x: Floats, space: FeasibleSet, penal
 def curvature_of(pairs: SecantPairs, steepest: float, range_: Floats) -> Curvature:
     """B in the variables' own units; it is learnt in ranges.
 
-    pairs: in the variables' own units; steepest: the largest gradient entry of the objective's rows; range_ (N,).
+    pairs: in the variables' own units; steepest: the largest gradient entry of the objective's rows, by the scale of
+      the variables; range_ (N,).
     """
     steps, changes = pairs.steps, pairs.changes
     assert isinstance(steps, np.ndarray)
@@ -361,12 +367,12 @@ def curvature_of(pairs: SecantPairs, steepest: float, range_: Floats) -> Curvatu
 
 
 def residual(own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float) -> float:
-    """The projected KKT residual at x, relative to the largest gradient entry `steepest`.
+    """The projected KKT residual at x, relative to the largest gradient entry `steepest`, in `FeasibleSet.scale`.
 
     own: the iterate's rows; penalty (J,): bounds of the constraints' multipliers. The multipliers are those of the
-    proximal step, whose curvature is that entry: they make the residual all but least. Where that step is long, rows
-    that do not compete here stop it; so it is tried without them, too, and the smaller residual told. It is the largest
-    of: what a step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
+    proximal step, whose curvature is that entry by the scale: they make the residual all but least. Where that step is
+    long, rows that do not compete here stop it; so it is tried without them, too, and the smaller residual told. It is
+    the largest of: what a step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
     the gaps of objective rows, the values of constraint rows and the slack of linear rows that carry a multiplier.
     """
     return multipliers(own, x, space, penalty, steepest)[0]
@@ -386,7 +392,7 @@ def multipliers(
         np.full(len(own), np.nan), own.group, own.own, own.age, own.distance,
     )  # fmt: skip
     found = _multipliers_of(lines, x, space, penalty, steepest)
-    near = _gaps(lines) <= NEAR * steepest
+    near = _gaps(lines) <= NEAR * steepest * space.scale
     if near.all() or not (near & (lines.group == 0)).any():
         return found
     among = _multipliers_of(lines.subset(near), x, space, penalty, steepest)
@@ -401,7 +407,7 @@ def _multipliers_of(
     lines: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float
 ) -> tuple[float, Floats, Floats]:
     """The multipliers of the proximal step of these lines, and the residual with them, as `multipliers` has them."""
-    flat, whole = Curvature.diagonal_of(np.full(len(x), steepest)), (space.lower, space.upper)
+    flat, whole = Curvature.diagonal_of(np.full(len(x), steepest / space.scale)), (space.lower, space.upper)
     trial = subproblem(lines, x, space, whole, penalty, flat)
     if not trial.solved:  # of violations that are rounding penalties rise without end
         trial = subproblem(lines, x, space, whole, np.minimum(penalty, HIGHEST * steepest), flat)
@@ -430,8 +436,10 @@ def residual_of(
       x (N,): the iterate.
       steepest: the largest gradient entry, which the residual is relative to.
     """
-    gradient = (multipliers @ _matrix(lines) + linear @ space.linear.A) / steepest
-    moved = float(np.abs(x - np.clip(x - gradient, space.lower, space.upper)).max(initial=0.0))
+    scale = space.scale
+    gradient = (multipliers @ _matrix(lines) + linear @ space.linear.A) / (steepest / scale)
+    moved = float(np.abs(x - np.clip(x - gradient, space.lower, space.upper)).max(initial=0.0)) / scale
     gaps = multipliers * _gaps(lines)
     slack = np.where(space.linear.equal, 0.0, np.abs(linear * space.linear.excess(x)))
-    return max(moved, float(gaps.sum() + slack.sum()) / steepest, abs(1.0 - float(multipliers[lines.group == 0].sum())))
+    missing = abs(1.0 - float(multipliers[lines.group == 0].sum()))
+    return max(moved, float(gaps.sum() + slack.sum()) / (scale * steepest), missing)

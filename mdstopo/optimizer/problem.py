@@ -45,6 +45,15 @@ class LinearRows:
         return np.asarray(np.einsum("ij,j->i", self.A, x) - self.b)
 
 
+def scale_of(lower: Floats, upper: Floats) -> float:
+    """What moves of variables within bounds (N,) are judged by: the largest bound, at most 1; 1 where all are zero.
+
+    Sizes may be small numbers, as areas in square metres are: moves of a millionth would be all that they can do.
+    """
+    largest = max(float(np.abs(lower).max(initial=0.0)), float(np.abs(upper).max(initial=0.0)))
+    return min(largest, 1.0) if largest > 0.0 else 1.0
+
+
 def largest_of_groups(values: Floats, group: Ints, groups: int) -> Floats:
     """The largest of the values (K,) of each group (groups,), group (K,) saying whose each is; -inf of one without."""
     out = np.full(groups, -np.inf)

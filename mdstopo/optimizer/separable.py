@@ -236,14 +236,15 @@ class SeparableMethod:
         linear = self.space.linear
         n_obj = model.n_objective
         gradient = np.einsum("r,ri->i", optimum.multipliers, model.slopes)
-        gradient = (gradient + np.einsum("r,ri->i", optimum.linear_multipliers, linear.A)) / steepest
+        scale = self.space.scale
+        gradient = (gradient + np.einsum("r,ri->i", optimum.linear_multipliers, linear.A)) / (steepest / scale)
         descended = np.clip(state.alpha - gradient, self.space.lower, self.space.upper)
-        moved = np.abs(state.alpha - descended).max(initial=0.0)
+        moved = np.abs(state.alpha - descended).max(initial=0.0) / scale
         below = model.values[:n_obj].max() - model.values[:n_obj]
         # a cut that said more of the iterate than is true is a slope of somewhere else, and no second peak here
         below[n_obj - len(state.cuts) :] += state.cuts_lowered
         gaps = optimum.multipliers[:n_obj] * below
         slack = np.where(linear.equal, 0.0, optimum.linear_multipliers * linear.excess(state.alpha))
         held = optimum.multipliers[n_obj:] * state.constraint_rows
-        complementarity = float(np.abs(gaps).sum() + np.abs(slack).sum() + np.abs(held).sum()) / steepest
+        complementarity = float(np.abs(gaps).sum() + np.abs(slack).sum() + np.abs(held).sum()) / (scale * steepest)
         return max(float(moved), complementarity)

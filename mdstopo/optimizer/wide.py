@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from mdstopo.optimizer.gsao_state import GsaoState, Step
 from mdstopo.optimizer.nearest_feasible import ROUNDING, repair
-from mdstopo.optimizer.problem import Floats, Ints, LinearRows
+from mdstopo.optimizer.problem import Floats, Ints, LinearRows, scale_of
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
 from mdstopo.optimizer.wide_numbers import LIGHT, WIDE, steepest, stride, threads_for, total
@@ -187,12 +187,14 @@ def propose(state: GsaoState, chosen: Indices, measures: Measures, settings: Set
     share = inf if power == 1.0 else 1.0 - settings.number("shift_margin")
     limits = np.array([power, settings.number("move_limit"), state.trust, share, state.convex * steepest])
     left = float(measures.excess(alpha)[0])
+    scale = scale_of(lower, upper)
     room = measures.room
     room.made = None
     trial, (slots, place, listed, counts, x) = np.empty(n), room.of(n)
     multiplier, miss, size, change, residual, plain, scaled, count = wide_minimum(
-        alpha, slope, cost, state.shift.array(), lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
-        _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), threads_for(n), trial, slots, place, listed, counts, x,
+        alpha, slope, cost, state.shift.array(), lower, upper, limits, bound, left + bound, bool(linear.equal[0]),
+        own / scale, _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), threads_for(n), trial, slots, place, listed,
+        counts, x,
     )  # fmt: skip
     room.used(count)
     if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > SOLVED * size and multiplier != 0.0):
@@ -204,8 +206,8 @@ def propose(state: GsaoState, chosen: Indices, measures: Measures, settings: Set
         room.made = Step(trial, alpha)
     if not _decides(state, chosen, trial, lower, upper, power):
         return None
-    slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
-    return Proposal(trial, float(state.rows[row]) + change, max(residual, slack))
+    slack = 0.0 if linear.equal[0] else abs(multiplier * left) / (scale * own)
+    return Proposal(trial, float(state.rows[row]) + change, max(residual / scale, slack))
 
 
 def _decides(state: GsaoState, chosen: Indices, trial: Floats, lower: Floats, upper: Floats, power: float) -> bool:

@@ -129,7 +129,7 @@ def wide_minimum(
     In:
       alpha (N,): the iterate.
       at_iterate: a x there.
-      steepest: the largest gradient entry, unit of the residual.
+      steepest: the largest gradient entry by the scale of the variables (`problem.scale_of`), unit of the residual.
       stride: every how many variables one is in the sample.
       rounding: what may be left of the row.
       threads: how many work.

@@ -97,6 +97,7 @@ class WideModel:
         n = len(space.lower)
         self.room, self.pool = Room.of(n), Pool(n)
         short = measures.space.unit
+        self._scale = space.scale
         self.unit = short if len(short) == n else short[:1]
         self.linear = [(np.ascontiguousarray(row), False) for row in space.linear.A]
 
@@ -108,18 +109,19 @@ class WideModel:
             half = len(vectors) // 2
             places = self.pool.places(vectors, self.unit)
             _, products = self._products(places)
-            sigma = known_curvature(products, half, FLOOR * steepest)
+            sigma = known_curvature(products, half, FLOOR * self._scale * steepest)
             M = compact(products, half, sigma)
             if M is not None:
                 return _WideAround(self, x, reach, sigma, vectors, products, M, scaled=True)
             vectors = vectors[1:half] + vectors[half + 1 :]  # without the oldest
-        return _WideAround(self, x, reach, FLOOR * steepest, [], NOTHING, NOTHING, scaled=True)
+        return _WideAround(self, x, reach, FLOOR * self._scale * steepest, [], NOTHING, NOTHING, scaled=True)
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual at x; see `RowModel.residual`."""
         if steepest == 0.0:
             return 0.0
-        anywhere = _WideAround(self, x, (np.inf, np.inf), steepest, [], NOTHING, NOTHING, scaled=False)
+        scale = self._scale
+        anywhere = _WideAround(self, x, (np.inf, np.inf), steepest / scale, [], NOTHING, NOTHING, scaled=False)
         program = anywhere.program(own, penalty)
         found = solve(program, self.room)
         K, linear = len(own), self.space.linear
@@ -127,14 +129,14 @@ class WideModel:
         space = self.measures.space
         places = program.places
         moved = projected(
-            self.pool.rows, places, theta, x, space.lower, space.upper, steepest, threads_for(len(x), LIGHT)
+            self.pool.rows, places, theta, x, space.lower, space.upper, steepest / scale, threads_for(len(x), LIGHT)
         )
         values = own.values()
         objective = own.group == 0
         gaps = theta[:K] * np.where(objective, values.max(initial=-np.inf, where=objective) - values, np.abs(values))
         slack = np.where(linear.equal, 0.0, np.abs(theta[K:] * self.measures.excess(x)))
         missing = abs(1.0 - float(theta[:K][objective].sum()))
-        return max(moved, float(gaps.sum() + slack.sum()) / steepest, missing)
+        return max(moved / scale, float(gaps.sum() + slack.sum()) / (scale * steepest), missing)
 
     def gradient_change(
         self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats, smooth: bool
