@@ -64,11 +64,11 @@ def _read(output: Output, case_path: Path, overrides: dict[str, str]) -> "Case":
 def _say_stated(output: Output, case: "Case", case_path: Path) -> dict[str, Any]:
     """What the file states, without computing any motion: warnings, parts, totals, material."""
     from mdstopo.cli.check_numbers import material, totals
-    from mdstopo.cli.check_scene import odd_scales
+    from mdstopo.cli.check_scene import left_behind, odd_scales
 
     for remark in case.warnings:
         output.notice(f"warning: {remark.located(str(case_path))}")
-    for question in odd_scales(case):
+    for question in (*odd_scales(case), *left_behind(case)):
         output.notice(f"warning: {question}")
     output.say(f"{case.title or case.name} ({case_path})")
     _say_bodies(output, case)
@@ -182,7 +182,7 @@ def _mistaken(case_path: Path, error: "CaseError") -> dict[str, Any]:
 
 def _say_doubts(output: Output, case: "Case", engine: "Evaluator") -> dict[str, Any]:
     """What nothing holds, what has no stiffness, and steps that are too long."""
-    from mdstopo.cli.check_scene import in_words, long_step, odd_scales, restraint
+    from mdstopo.cli.check_scene import in_words, left_behind, long_step, odd_scales, restraint
 
     held, steps = {}, []
     for name, scene in engine.scenes.items():
@@ -193,7 +193,7 @@ def _say_doubts(output: Output, case: "Case", engine: "Evaluator") -> dict[str, 
         if too_long := long_step(case, modes, scene.bodies):
             steps.append(too_long)
             output.notice(f"warning: load case {name}: {too_long}")
-    return {"restraint": held, "long_steps": steps, "odd_scales": odd_scales(case)}
+    return {"restraint": held, "long_steps": steps, "odd_scales": odd_scales(case), "left_behind": left_behind(case)}
 
 
 def _say_bodies(output: Output, case: "Case") -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, LoadCase
+from mdstopo.cli.check_numbers import depths
 from mdstopo.cli.output import number
 
 Floats = NDArray[np.float64]
@@ -15,6 +16,9 @@ Floats = NDArray[np.float64]
 ODD = 100.0
 #: gravity beyond which it is hardly one, m/s^2
 HEAVY = 1000.0
+#: how near a point has to be to touch, and how far a body moves while another stands that should travel with it, in
+#: the size of the larger of both
+TOUCHING, FAR = 0.02, 5.0
 #: steps that a period has at least, to be seen at all
 FEWEST = 10.0
 
@@ -50,6 +54,33 @@ def odd_scales(case: Case) -> list[str]:
         size = float(np.linalg.norm(load_case.gravity))
         if size > HEAVY:
             found.append(f"gravity of {number(size, 4)} m/s^2 in load case {load_case.name}: is it in mm/s^2?")
+    return found
+
+
+def left_behind(case: Case) -> list[str]:
+    """Bodies that stand at the start and touch one that moves, so fast that it will be far away; a question each.
+
+    Of two bodies that travel together one may have been given its velocity alone.
+    """
+    found = []
+    for contact, depth in zip(case.contacts, depths(case), strict=True):
+        names = contact.body, contact.edge_body
+        reach = max((_reach(case, name) for name in names if name != GROUND), default=0.0)
+        if not (depth > -TOUCHING * reach).any():
+            continue
+        for load_case in case.load_cases:
+            driven = {motion.body for motion in load_case.motions}
+            starts = {body.name: body for body in load_case.bodies}
+            speeds = [float(np.linalg.norm(starts[name].velocity)) if name in starts else 0.0 for name in names]
+            away = max(speeds) * (load_case.end - load_case.start)
+            stands = names[int(np.argmin(speeds))]
+            if min(speeds) > 0.0 or not away > FAR * reach > 0.0 or stands in driven or stands == GROUND:
+                continue
+            moves = names[int(np.argmax(speeds))]
+            found.append(
+                f"body {stands} stands at the start of load case {load_case.name}, {moves}, which it touches (contact "
+                f"{contact.name}), moves at {number(max(speeds), 3)} m/s: has it a velocity, too?"
+            )
     return found
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.cli.check_cost import in_words as cost_in_words
-from mdstopo.cli.check_scene import in_words, long_step, odd_scales, restraint, unrestrained
+from mdstopo.cli.check_scene import in_words, left_behind, long_step, odd_scales, restraint, unrestrained
 from mdstopo.cli.front_display import line
 from mdstopo.cli.group import run_group
 from mdstopo.cli.progress import Rate
@@ -62,9 +62,45 @@ def test_lengths_inertias_and_gravity_in_other_units_are_asked_about(changes: di
         assert word in told
 
 
-def test_the_cases_of_the_project_have_no_odd_scales() -> None:
+def test_the_cases_of_the_project_have_no_odd_scales_and_leave_no_body_behind() -> None:
     for path in sorted((ROOT / "cases").glob("*.yaml")):
         assert odd_scales(load_case(path)) == [], path
+        assert left_behind(load_case(path)) == [], path
+
+
+SEATED = """\
+format: 1
+gravity: [0, -9.8]
+time: {end: 1}
+bodies:
+  car: {mass: 1500, inertia: 900, position: [0, 0], velocity: [CAR, 0]}
+  driver: {mass: 80, inertia: 4, position: [0, HEIGHT], velocity: [DRIVER, 0]}
+points:
+  hips: {body: driver, grid: {list: [[-0.2, HEIGHT], [0.2, HEIGHT]]}}
+  cushion: {body: car, grid: {list: [[-0.4, 0], [0.4, 0]]}}
+contacts:
+  - {name: seat, points: hips, on: {body: car, from: [-0.4, 0.0], to: [0.4, 0.0]}, stiffness: 2.0e4}
+members:
+  belts: {from: hips, to: cushion, law: {type: spring, stiffness: 4000}}
+objectives:
+  G: {response: energy}
+"""
+
+
+@pytest.mark.parametrize(
+    ("car", "driver", "height", "asked"),
+    [(20, 0, 0.001, True), (20, 20, 0.001, False), (20, 0, 0.5, False), (0.1, 0, 0.001, False), (0, 0, 0.001, False)],
+)
+def test_a_body_that_stands_on_one_that_drives_away_is_asked_about(
+    car: float, driver: float, height: float, asked: bool
+) -> None:
+    text = SEATED.replace("CAR", str(car)).replace("DRIVER", str(driver)).replace("HEIGHT", str(height))
+    told = left_behind(read_case(text))
+    assert len(told) == asked
+    for sentence in told:
+        assert "body driver stands" in sentence
+        assert "contact seat" in sentence
+        assert "20 m/s" in sentence
 
 
 def test_bodies_that_nothing_holds_are_named_together() -> None:
