@@ -10,6 +10,7 @@ from mdstopo.case.model import GROUND, Case, Contact, SpringLaw, SurfaceContact,
 from mdstopo.case.responses.columns import point_columns
 from mdstopo.case.responses.response_units import BOUNDED
 from mdstopo.cli.output import number
+from mdstopo.cli.values_of_motion import group_names
 from mdstopo.scene.bodies import placed
 
 Floats = NDArray[np.float64]
@@ -81,7 +82,7 @@ def material(case: Case) -> list[list[str]]:
                 row.bound,
                 *(row.spent(x) for x in (case.start, *_bounds(case))),
             )
-            rows.append([", ".join(row.groups), BOUNDED[row.sense], *(number(value) for value in values)])
+            rows.append([group_names(row), BOUNDED[row.sense], *(number(value) for value in values)])
     return rows
 
 

@@ -263,22 +263,23 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     import numpy as np
 
     from mdstopo.case.model import VolumeRow
-    from mdstopo.case.responses.response_units import bounded, constrained
+    from mdstopo.case.responses.response_units import bounded
     from mdstopo.case.text.words import count_text
     from mdstopo.cli.show import values_text
+    from mdstopo.cli.values_of_motion import bounded_name
     from mdstopo.scene.moving_volumes import spent
     from mdstopo.session.sizes import at_prices
 
     case, lines = outcome.case, []
     for i, (row, excess) in enumerate(zip(case.constraints, outcome.constraints.tolist(), strict=True)):
         if not isinstance(row, VolumeRow):
-            lines.append((constrained(case, row), f"{number(excess + row.bound, 9)}, {bounded(row)}"))
+            lines.append((bounded_name(case, row), f"{number(excess + row.bound, 9)}, {bounded(row)}"))
             lines += [(title, sentence) for title, sentence in lines_of(outcome.conclusion, f"constraints[{i}]")]
         else:
             design = np.concatenate([outcome.alpha, *outcome.variables.values()])
             chosen = outcome.sizes is not None and bool(outcome.sizes.sizes)
             used = spent(case, row, at_prices(case, design) if chosen else design)
-            lines.append((constrained(case, row), f"{number(used, 9)}, {bounded(row)}"))
+            lines.append((bounded_name(case, row), f"{number(used, 9)}, {bounded(row)}"))
     width = case.upper - case.lower
     # A member whose bounds are equal is as much there as they say.
     share = np.divide(outcome.alpha - case.lower, width, out=np.array(outcome.alpha), where=width > 0.0)

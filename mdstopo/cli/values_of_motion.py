@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from mdstopo.case.model import Case, FloatArray, ResponseRow, VolumeRow
     from mdstopo.evaluation import MotionValues
 
+#: groups of a volume row from which on a table names the first two
+MANY = 4
+
 
 @dataclass(frozen=True)
 class Values:
@@ -57,9 +60,24 @@ def is_kept(row: "VolumeRow | ResponseRow", value: float, tolerance: float) -> b
     return excess <= tolerance * (abs(row.bound) or 1.0)
 
 
+def group_names(row: "VolumeRow") -> str:
+    """The groups of a volume row, of many the first two: a final case has one for each member, and no line for all."""
+    if len(row.groups) <= MANY:
+        return ", ".join(row.groups)
+    return f"{', '.join(row.groups[:2])} and {len(row.groups) - 2} more groups"
+
+
+def bounded_name(case: "Case", row: "VolumeRow | ResponseRow") -> str:
+    """What a constraint bounds, for a table: `volume of belts`, `max displacement x of torso, braking`."""
+    from mdstopo.case.model import VolumeRow
+    from mdstopo.case.responses.response_units import constrained
+
+    return f"volume of {group_names(row)}" if isinstance(row, VolumeRow) else constrained(case, row)
+
+
 def rows_of(case: "Case", found: Values) -> list[list[str]]:
     """The values as rows of a table."""
-    from mdstopo.case.responses.response_units import bounded, constrained, unit_of_value, words
+    from mdstopo.case.responses.response_units import bounded, unit_of_value, words
 
     rows = []
     for each in case.objectives:
@@ -72,7 +90,7 @@ def rows_of(case: "Case", found: Values) -> list[list[str]]:
     for i, value in found.constraints.items():
         row = case.constraints[i]
         broken = "" if is_kept(row, value, case.optimizer.tolerance) else ": not kept"
-        rows.append([constrained(case, row), f"{number(value, 9)}, {bounded(row)}{broken}"])
+        rows.append([bounded_name(case, row), f"{number(value, 9)}, {bounded(row)}{broken}"])
     if found.failure:
         rows.append(["responses", f"not known: {found.failure}"])
     return rows

@@ -76,3 +76,14 @@ def test_a_case_without_objectives_and_constraints_is_simulated_as_ever(capsys):
     assert run_group(["simulate", "plain.yaml", "--json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert (content["objectives"], content["constraints"]) == ({}, [])
+
+
+@pytest.mark.parametrize("command", ["simulate", "check", "run"])
+def test_a_volume_of_many_groups_has_a_short_name(command, capsys):
+    one = OSCILLATOR[OSCILLATOR.index("  spring:") : OSCILLATOR.index("load_cases:")]
+    many = "".join(one.replace("spring:", f"spring_{i}:", 1) for i in range(9))
+    Path("many.yaml").write_text(OSCILLATOR.replace(one, many))
+    assert run_group([command, "many.yaml", "--set", "constraints[0].limit=40"]) in (0, 1)
+    told = capsys.readouterr().out
+    assert "spring_0, spring_1 and 7 more groups" in told
+    assert "spring_0, spring_1, spring_2" not in told

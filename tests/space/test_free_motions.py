@@ -58,6 +58,17 @@ def test_a_load_settles_with_its_heading_and_gradients_know_where() -> None:
     check_exact_methods(case, alpha)
 
 
+def test_an_angular_velocity_turns_with_the_body_that_settles() -> None:
+    spin = np.array([0.4, -0.2, 3.0])  # rad/s, as the lamp is drawn, whose axes are the global ones
+    case = read_case(CRATE, overrides={"bodies.lamp.angular_velocity": spin.tolist()})
+    motion = mdstopo.simulate(case, np.random.default_rng(0).uniform(0.3, 1.0, case.n_design))
+    before, after = (Rotation.from_quat(motion.at([t]).q[0, 10:14], scalar_first=True) for t in (0.0, 1e-6))
+    assert before.magnitude() > 1e-3
+    turned = (after * before.inv()).as_rotvec() / 1e-6
+    assert np.abs(turned - before.apply(spin)).max() < 1e-3 * before.magnitude()
+    assert np.abs(turned - spin).max() > 0.3 * before.magnitude()
+
+
 def test_a_load_on_a_rail_has_no_free_turn() -> None:
     rail = "joints: [{type: prismatic, bodies: [ground, crate], at: [0.1, 0.05, 0.5], axis: [1, 0, 0]}]\nmembers:"
     case = read_case(CRATE.replace("members:", rail))
