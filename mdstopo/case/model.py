@@ -52,7 +52,7 @@ from mdstopo.case.objects.aims import (
     Variable,
     VolumeRow,
 )
-from mdstopo.case.objects.design_space import DesignSpace, slots_of
+from mdstopo.case.objects.design_space import DesignSpace, slots_of, units_of
 from mdstopo.case.objects.fitting import Fit
 from mdstopo.case.objects.parts import (
     AnyContact,
@@ -239,7 +239,12 @@ class Case(Value):
     def space(self) -> DesignSpace:
         """The map from the optimiser's variables to alpha and the values of variables."""
         counts = {group.name: len(group) for group in self.design_groups}
-        return DesignSpace(self.n_design, slots_of(counts, self.shared, self.mirrored), self.variables)
+        slots = slots_of(counts, self.shared, self.mirrored)
+        # prices of candidates that are not built are by alpha, and sizes of a catalogue are alphas
+        in_alpha = any(group.candidates is not None or group.sizes for group in self.design_groups)
+        bounds = [] if in_alpha else [(group.lower, group.upper) for group in self.design_groups]
+        units = units_of(bounds, list(counts.values()), slots)
+        return DesignSpace(self.n_design, slots, self.variables, units)
 
     @property
     def defined_variables(self) -> tuple[Variable, ...]:

@@ -24,7 +24,7 @@ from mdstopo.case.scene.contacts import build_contacts
 from mdstopo.case.scene.dimensions import geometry_in
 from mdstopo.case.scene.groups import build_groups
 from mdstopo.case.scene.links import build_bushings, build_joints, declare_joints
-from mdstopo.case.scene.load_case_times import windows
+from mdstopo.case.scene.load_case_times import time_spans
 from mdstopo.case.scene.load_cases import build_load_cases
 from mdstopo.case.scene.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.scene.points import build_points
@@ -211,7 +211,7 @@ def _build(
     """
     declare_joints(top["joints"], reading)
     _check_references(top, reading)
-    times = windows(top, reading)
+    times = time_spans(top, reading)
     by_case = merged(top, reading)
     starts = resolve_starts(top, times, by_case, geometry, reading)
     frames = _frames(top, starts, geometry, reading)

@@ -10,6 +10,7 @@ from typing import Any, TextIO
 
 from mdstopo.cli import lost
 from mdstopo.compiler.told import listeners
+from mdstopo.store.json_values import json_value
 
 #: seconds between two notices that kernels are being compiled
 _EVERY = 10.0
@@ -53,7 +54,7 @@ class Output:
         """Print the result as JSON, where that is wanted."""
         if self.json:
             plainly = (sys.stdout.encoding or "").lower().replace("-", "") != "utf8"
-            write(sys.stdout, json.dumps(plain(content), ensure_ascii=plainly, allow_nan=False))
+            write(sys.stdout, json.dumps(json_value(content), ensure_ascii=plainly, allow_nan=False))
 
 
 class _Compiling:
@@ -120,21 +121,6 @@ def aligned(rows: Iterable[Sequence[str]], indent: str = "  ") -> list[str]:
 
 def _is_numeric(cells: list[str]) -> bool:
     return bool(cells) and all(cell == "" or cell[0] in "0123456789-+." or cell == "nan" for cell in cells)
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON can have it: arrays as lists, NaN and infinities as null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, str) or value is None or isinstance(value, (bool, int)):
-        return value
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    return str(value)
 
 
 def number(value: float, digits: int = 6) -> str:

@@ -142,7 +142,7 @@ def _violations(view: "ResultView") -> "NDArray[Any]":
     import numpy as np
 
     from mdstopo.case.text.errors import CaseError
-    from mdstopo.limiting.compare import exceeded
+    from mdstopo.starts.constraint_columns import exceeded
     from mdstopo.store.stored_case import case_of
 
     excess = np.asarray(view.array("iterations/constraints"), dtype=np.float64)

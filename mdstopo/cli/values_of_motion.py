@@ -49,7 +49,11 @@ def values_of(case: "Case", design: "FloatArray", evaluated: "Sequence[MotionVal
 
 def is_kept(row: "VolumeRow | ResponseRow", value: float, tolerance: float) -> bool:
     """Whether a value keeps its bound, up to that share of it."""
-    excess = {"limit": value - row.bound, "at_least": row.bound - value, "equals": abs(value - row.bound)}[row.sense]
+    import numpy as np
+
+    from mdstopo.starts.constraint_columns import exceeded
+
+    excess = float(exceeded(row.sense, np.array(value - row.bound)))
     return excess <= tolerance * (abs(row.bound) or 1.0)
 
 

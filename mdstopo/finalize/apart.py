@@ -49,10 +49,11 @@ def free_name(whole: str, place: int, taken: set[str]) -> str:
 
 
 def unlike(case: Case, kept: IndexArray) -> set[str]:
-    """Groups that have to be taken apart: of which different members are kept though member k of each has the same
-    value.
+    """The groups that have to be taken apart, each member a group of its own.
 
-    So are those whose members k go with theirs by other variables or by `mirrored`.
+    These are groups that have the values of a variable in common, member k of each one the same value (`each: member`),
+    of which different members are kept; and groups that are joined to such a group by a further variable of this kind
+    or by `mirrored`.
     """
     own = {group.name: places for group, places in with_own(case, kept)}
     found: set[str] = set()

@@ -30,8 +30,8 @@ from mdstopo.case.text.reading import Reading
 from mdstopo.case.text.words import inside
 from mdstopo.finalize.apart import free_name
 from mdstopo.finalize.names import following_law, kept_expressions
-from mdstopo.finalize.scaled_laws import sized as sized_law
-from mdstopo.finalize.sized_laws import Given, bound_of, differ, given, never_late, with_values
+from mdstopo.finalize.parameter_values import Given, bound_of, differ, given, with_valid_times, with_values
+from mdstopo.finalize.scaled_laws import scaled_law
 from mdstopo.store.store_errors import StoreError
 
 Plain = dict[str, Any]
@@ -40,9 +40,9 @@ Plain = dict[str, Any]
 def content_of(case: Case) -> Plain:
     """The document that a case was read from, with what --set changed and the rows of included files in place.
 
-    Expressions are the numbers that they come to, but for those of names that were design variables. Raises StoreError
-    where an included file cannot be read any more, or is another than was read, and where defined names are uncertain,
-    for no number would follow them any more.
+    Expressions are replaced by their values, except those of names that were design variables. Raises StoreError where
+    an included file cannot be read any more or has changed since, and where defined names are uncertain: the numbers
+    that replace expressions would not follow them.
     """
     root = parse(case.text.removeprefix("\ufeff"), lambda _mistake: None)
     assert root is not None  # it has been read before
@@ -140,7 +140,7 @@ def _files(case: Case) -> Plain:
 
 
 def _fixed(case: Case) -> dict[str, list[str]]:
-    """Groups without design, each with the groups that it becomes: itself, or one for each member."""
+    """Groups without design variables, each with the groups that it becomes: itself, or one for each member."""
     taken = {group.name for group in case.members if not group.design}
     return {
         group.name: [free_name(group.name, i, taken) for i in range(len(group))]
@@ -195,7 +195,7 @@ def _at_values(stated: Plain, values: Given, case: Case) -> Plain:
     if not values:
         return stated
     laws = stated["law"] if isinstance(stated["law"], list) else [stated["law"]]
-    found = [never_late({**law, **values.get(place, {})}, case) for place, law in enumerate(laws)]
+    found = [with_valid_times({**law, **values.get(place, {})}, case) for place, law in enumerate(laws)]
     return {**stated, "law": found if isinstance(stated["law"], list) else found[0]}
 
 
@@ -209,7 +209,7 @@ def _laws(
     stated: the group in the document, with expressions that are kept; None: none are.
     """
     laws = with_values(group.laws, given(case, group, i, values))
-    found = [never_late(sized_law(law, factor), case) for law in laws]
+    found = [with_valid_times(scaled_law(law, factor), case) for law in laws]
     if stated is not None:
         found = [following_law(stated["law"], k, laws[k], each, factor) for k, each in enumerate(found)]
     return found[0] if len(found) == 1 else found
@@ -263,7 +263,8 @@ def _objectives(stated: Plain, groups: Mapping[str, list[str]], told: list[str])
 
 
 def _versions(stated: Plain, groups: Mapping[str, list[str]]) -> list[Plain]:
-    """What has a response, once for each group that `member_force` has now to look at."""
+    """An objective or constraint, once for each group that its `member_force` is now about: of the group that it names
+    each member kept is a group of its own."""
     response = stated["response"]
     if isinstance(response, dict) and "expression" in response:
         return [{**stated, "response": made} for made in _expressions(response["expression"], groups)]
@@ -271,14 +272,14 @@ def _versions(stated: Plain, groups: Mapping[str, list[str]]) -> list[Plain]:
 
 
 def _forces(response: Any, groups: Mapping[str, list[str]]) -> list[Any]:
-    """A response, once for each group that `member_force` has now to look at."""
+    """A response, once for each group that its `member_force` is now about; as it is where it has none."""
     looks = isinstance(response, dict) and "member_force" in response
     group = str(response["member_force"]["group"]) if looks else ""
     return [{"member_force": {"group": name}} for name in groups[group]] if group in groups else [response]
 
 
 def _expressions(stated: Plain, groups: Mapping[str, list[str]]) -> list[Plain]:
-    """An expression of responses, none where a member that it looks at is not kept."""
+    """An expression of responses in a list; an empty list where no member of a group that it is about is kept."""
     versions = {name: _forces(part, groups) for name, part in stated["of"].items()}
     if not all(versions.values()):
         return []

@@ -20,12 +20,12 @@ from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.equilibria import Comparison, compare_equilibria
 from mdstopo.finalize.keep import check, check_restricted, chosen, kept_values, one_alpha, places, restricted
 from mdstopo.finalize.names import with_names_fixed
-from mdstopo.finalize.sized_laws import Parameter, told_apart
+from mdstopo.finalize.parameter_values import Parameter, changed_parameters
 from mdstopo.scene.refusals import refusals
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.run_session import run_session
 from mdstopo.starts.callbacks import ignore, never
-from mdstopo.starts.evaluator_interface import Evaluation, even, problem_of
+from mdstopo.starts.evaluator_interface import Evaluation, equal_weights, problem_of
 from mdstopo.starts.single_start import first_design, unshared
 from mdstopo.status import RunStatus
 from mdstopo.store.design_files import with_values
@@ -34,15 +34,15 @@ from mdstopo.store.store_errors import StoreError
 from mdstopo.store.stored_case import case_of
 
 TIGHTER = 100.0
-"""By how much the tolerance of the verification is below the case's."""
-TIGHTEST = 1e-13
-"""Tolerances below it are lost in rounding."""
-WORSE = 0.05
-"""Share by which an objective may be worse than the full design's without a word."""
-FAR = 10.0
-"""The share from which on it is no longer told: the full design has brought the objective near zero."""
+"""The verification's tolerance is the case's divided by this."""
 SHORTER = 10.0
-"""The same for fixed steps: errors of second order fall a hundredfold."""
+"""The verification's fixed step is the case's divided by this: errors of second order fall a hundredfold."""
+TIGHTEST = 1e-13
+"""The smallest tolerance of a verification: below it, rounding is larger than the errors that it asks for."""
+WORSE = 0.05
+"""An objective that is worse than the full design's by more than this share of it is warned of."""
+FAR = 10.0
+"""From this share on the warning says "far" and no percentage: the full design's objective is near zero."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,15 @@ class Finalized:
     """A result whose members were kept, sized anew and verified, and the text of the final case.
 
     case: the full one; reduced: with only the members kept. kept (K,): their places among the design members, places:
-    in their groups. before, alpha (K,): their alphas in the result and now; values: the same of parameters of laws.
-    columns: full design, kept, re-optimised, verified, the last two those of the final case where there are such
-    parameters and it says all. outcome: of the re-optimisation. tighter: the verification's tolerance or step in words.
-    text: the final case, empty where there is none; told: what it cannot say. difference: largest relative one between
-    its objectives and those of the re-optimised design, None where it has none. equilibria: where the final design
-    settles, beside the full one; there is no text where that is lost.
+    in their groups. before, alpha (K,): their alphas in the result and now; values: parameters of laws, before and now.
+    outcome: of the re-optimisation. columns: full design, kept, re-optimised, verified; the last two are computed with
+    the final case where the case has design variables beside alpha and the final case keeps all objectives and
+    constraints; empty where the run was interrupted. tighter: the verification's tolerance or step in words. text: the
+    final case, empty where there is none; told: sentences on what of the old case it leaves out. difference: the
+    largest relative one between the objectives of the final case and those of the re-optimised design, None where it
+    has no objectives. equilibria: where the final design settles, compared with the full one; where it does not rest at
+    the full design's equilibrium there is no text. worse: sentences on objectives that are worse than the full
+    design's.
     """
 
     case: Case
@@ -73,13 +76,13 @@ class Finalized:
     places: list[tuple[str, int]]
     before: FloatArray
     alpha: FloatArray
-    columns: tuple[Column, ...]
-    outcome: Outcome
-    tighter: str
-    text: str
-    told: list[str]
-    difference: float | None
     values: list[Parameter]
+    outcome: Outcome
+    columns: tuple[Column, ...] = ()
+    tighter: str = ""
+    text: str = ""
+    told: list[str] = field(default_factory=list)
+    difference: float | None = None
     equilibria: Comparison = field(default_factory=Comparison)
     worse: tuple[str, ...] = ()
 
@@ -92,7 +95,9 @@ class Finalized:
 def opened(
     view: ResultView, changes: Mapping[str, str], notify: Callable[[str], None] = ignore
 ) -> tuple[Case, FloatArray]:
-    """The case of a run, with further keys set, and its best design (N + P,), alphas that are one made so.
+    """The case of a run, with further keys set, and its best design (N + P,).
+
+    Where the case has one alpha for several members (`shared`, `mirrored`) the design has their mean.
 
     Points and defined names that were design variables stay where the design has them, and are none any more. Raises
     CaseError and StoreError.
@@ -124,7 +129,8 @@ def opened(
 def ready(case: Case, design: FloatArray, keep: int | None, threshold: float | None) -> tuple[IndexArray, Case]:
     """The members to keep and the case with only these; everything that can be refused is refused here.
 
-    design (N,) or (N + P,). Members whose alphas are one are kept together. Without any design member all is kept.
+    design (N,) or (N + P,). Members that have one alpha together are all kept, or none of them. A case without design
+    members keeps all of its members.
     Raises CaseError and StoreError.
     """
     check(case)
@@ -189,20 +195,20 @@ def finalize(
     )
     engine = make_engine(reduced)
     reached = np.concatenate([outcome.alpha, *outcome.variables.values()])
-    now = reduced.space.expand(first_design(reduced, problem_of(engine, even(reduced)), reached)[1])
+    now = reduced.space.expand(first_design(reduced, problem_of(engine, equal_weights(reduced)), reached)[1])
     own = places(case, kept)
-    values = told_apart(case, held, before[count:], now[count:])
-    equilibria = Comparison()
-
-    def made(columns: tuple[Column, ...], words: str, text: str, told: list[str], gap: float | None) -> Finalized:
-        sizes, stated = now[:count], before[:count]
-        return Finalized(
-            case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values, equilibria,
-            worse_than_promised(case, columns),
-        )  # fmt: skip
-
+    sized_again = Finalized(
+        case=case,
+        reduced=reduced,
+        kept=kept,
+        places=own,
+        before=before[:count],
+        alpha=now[:count],
+        values=changed_parameters(case, held, before[count:], now[count:]),
+        outcome=outcome,
+    )
     if outcome.status is RunStatus.INTERRUPTED:
-        return made((), "", "", [], None)
+        return sized_again
     found = engine.evaluate(now, gradient=False)
     full = Column("full design", case.n_design, make_engine(case).evaluate(design, gradient=False))
     first = Column("kept as they were", count, engine.evaluate(before, gradient=False))
@@ -222,15 +228,15 @@ def finalize(
     tighter, words = _tighter(source)
     verified = make_engine(tighter).evaluate(sized, gradient=False)
     columns = (full, first, Column("re-optimised", count, found), Column("verified", count, verified))
+    compared = replace(sized_again, columns=columns, tighter=words, worse=worse_than_promised(case, columns))
     if not (found.status.usable and verified.status.usable):
-        return made(columns, words, "", [], None)
+        return compared
     end = design.copy()  # the final design as one of the full case: members left out have no size
     end[: case.n_design] = 0.0
     end[kept], end[case.n_design + held] = now[:count], now[count:]
     equilibria = compare_equilibria(joined, design, end, reduced, now)
-    if equilibria.lost:
-        return made(columns, words, "", [], None)
-    return made(columns, words, text, told, difference)
+    compared = replace(compared, equilibria=equilibria)
+    return compared if equilibria.lost else replace(compared, text=text, told=told, difference=difference)
 
 
 def _has_variables_of_fixed_members(case: Case) -> bool:
@@ -240,9 +246,9 @@ def _has_variables_of_fixed_members(case: Case) -> bool:
 
 
 def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...]:
-    """Sentences about objectives that are more than `WORSE` worse in the last column than in the first.
+    """Sentences about objectives that are worse in the last column than in the first by more than `WORSE`.
 
-    None about objectives of weight 0, which a run only reports.
+    There are none about objectives of weight 0, which a run only reports.
     """
     if not columns or not all(columns[k].evaluation.status.usable for k in (0, -1)):
         return ()
@@ -267,7 +273,7 @@ def _says_all(final: Case, reduced: Case) -> bool:
 
 
 def _tighter(case: Case) -> tuple[Case, str]:
-    """The case with a hundredth of its errors, and how."""
+    """The case with a hundredth of its errors, and in words the tolerance or step by which it gets that."""
     solver = case.solver
     if solver.step is not None:
         step = solver.step / SHORTER

@@ -13,7 +13,7 @@ from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Law
 
 
-def sized(law: Law, factor: float) -> dict[str, Any]:
+def scaled_law(law: Law, factor: float) -> dict[str, Any]:
     """The law times a factor, as the mapping of the case file; keys that have their defaults are left out."""
     if isinstance(law, OfFormulas):
         return law.stated_times(factor)

@@ -99,7 +99,7 @@ class FitProblem:
                 out[part, self.delays[s]] = -self._rates[s]
         return out
 
-    def left(self, misfit: FloatArray) -> FloatArray:
+    def root_mean_squares(self, misfit: FloatArray) -> FloatArray:
         """(S,) the root mean square of a misfit (n,) in each series, in the unit of its response."""
         return np.array([float(np.sqrt(np.mean(misfit[part] ** 2))) for part in self.parts])
 

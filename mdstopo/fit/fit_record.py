@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,11 @@ from mdstopo.fit.prepared import case_at
 from mdstopo.fit.run_fit import FitRun
 from mdstopo.store.contents import Datasets, case_part, design_part, trajectory_part
 from mdstopo.store.image import Attribute
+from mdstopo.store.json_values import json_value
 from mdstopo.store.provenance import Provenance
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.same_case import describe
+from mdstopo.store.set_keys import set_keys
 from mdstopo.store.store_errors import StoreError, WriteError
 from mdstopo.store.writing import write_result
 
@@ -69,7 +71,7 @@ class FitFile:
         settings: dict[str, Attribute] = {
             "loss": fit.loss, "confidence": fit.confidence, "starts": fit.starts, "seed": fit.seed,
         }  # fmt: skip
-        settings |= {f"set {key}": str(value) for key, value in self._case.overrides.items()}
+        settings |= set_keys(self._case)
         whole = self._fixed | part
         write_result(self.path, self._case, KIND, status, reason, whole, self._provenance, settings, warnings)
 
@@ -144,7 +146,7 @@ def _series(run: FitRun) -> Datasets:
                 [shown.x[p] if p >= 0 else getattr(each, key).initial for each, p in zip(series, places, strict=True)]
             )
         residuals = shown.misfit / shown.deviation
-        part["series/root_mean_square"] = problem.left(shown.misfit)
+        part["series/root_mean_square"] = problem.root_mean_squares(shown.misfit)
         part["series/chi_square"] = np.array([float(np.sum(residuals[own] ** 2)) for own in problem.parts])
     for each, own in zip(problem.measured, problem.parts, strict=True):
         group = f"measured/{each.series.name}"
@@ -177,7 +179,7 @@ def _evaluations(run: FitRun) -> Datasets:
     return {
         "evaluations/start": np.array([each.start for each in trace], dtype=np.int64),
         "evaluations/x": np.array([each.x for each in trace]).reshape(len(trace), p),
-        "evaluations/root_mean_square": np.array([each.left for each in trace]).reshape(len(trace), s),
+        "evaluations/root_mean_square": np.array([each.root_mean_squares for each in trace]).reshape(len(trace), s),
     }
 
 
@@ -219,7 +221,7 @@ def content(view: ResultView) -> dict[str, Any]:
     if view.kind != KIND:
         raise StoreError(f"{view.path} holds a result of `{view.kind}`, not of `fit`")
     arrays = view.under(KIND)
-    whole: dict[str, Any] = plain(
+    whole: dict[str, Any] = json_value(
         {
             "case": view.name,
             "title": view.title,
@@ -287,16 +289,3 @@ def _read_series(view: ResultView) -> list[dict[str, Any]]:
             for key, column in view.under(f"{KIND}/measured/{own['name']}").items()
         }
     return found
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON can have it: arrays as lists, numbers that are not finite as null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    return value

@@ -48,9 +48,9 @@ class Minimum:
     """Where a fit has ended.
 
     x (p,): the estimates. misfit (n,): predicted less measured, slopes (n, p): its derivatives. deviation (n,): of each
-    value. cost: half the sum of the squares (or of what the loss makes of them) of misfit over deviation. level: what
-    fits are compared by, minus the logarithm of how likely they are, but for a constant. status: converged |
-    max_iterations | failed; reason: in words. evaluations: of the misfit.
+    value. cost: half the sum of the squares (or of what the loss makes of them) of misfit over deviation. level: the
+    negative log-likelihood without its constant, by which fits with different estimated deviations are compared.
+    status: converged | max_iterations | failed; reason: in words. evaluations: of the misfit.
     """
 
     x: FloatArray
@@ -149,7 +149,7 @@ def deviation_of(problem: FitProblem, misfit: FloatArray, y: FloatArray) -> floa
 
 
 def _least_deviation(y: FloatArray) -> float:
-    """Below which no deviation of values y (n,) is estimated."""
+    """The smallest deviation that is estimated of values y (n,)."""
     return max(LEAST_DEVIATION * (float(np.abs(y).max()) or 1.0), np.finfo(float).tiny)
 
 
@@ -193,7 +193,7 @@ def minimum(
         if trouble and evaluations == 1:
             raise MotionError(trouble)
         if trouble:
-            return np.full_like(misfit, np.inf)  # the step is taken for too long, and a shorter one is tried
+            return np.full_like(misfit, np.inf)  # SciPy takes that for a step too long, and tries a shorter one
         seen(Evaluated(whole(u), misfit, deviation))
         return misfit / deviation
 

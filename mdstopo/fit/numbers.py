@@ -31,7 +31,7 @@ DEFINED = "define."
 SHIFT, SHIFT_OF_MOTIONS = 1e-3, 1e-4
 #: the size of a number is at least this share of the way between its bounds
 LEAST = 3e-3
-#: what parameters of laws may miss a straight line by, relative
+#: by how much parameters of laws may deviate from a linear function of the numbers, relative
 STRAIGHT = 1e-12
 
 

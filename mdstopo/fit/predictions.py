@@ -22,10 +22,10 @@ from mdstopo.status import Status
 #: tolerance of motions that are differenced, relative to that of the case, and at most
 TIGHTER, TIGHT = 1e-2, 1e-10
 LEAST_TOLERANCE = 1e-12
-#: what arrays may miss a straight line by, relative
+#: by how much arrays may deviate from a linear function of the numbers, relative
 STRAIGHT = 1e-11
-#: the arrays that the balance is differentiated by
-READ = ("mass", "force", "load_force", "load_arm", "v0")
+#: the arrays by which the equations of motion are differentiated
+EQUATION_ARRAYS = ("mass", "force", "load_force", "load_arm", "v0")
 
 #: the arrays of all load cases with a larger and with a smaller number, and by how much the numbers differ
 Pair = tuple[dict[str, GeneralModel], dict[str, GeneralModel], float]
@@ -119,7 +119,8 @@ class Predictions:
 
     @cached_property
     def _integrator(self) -> str:
-        """The one that suits the numbers as stated, for all x: else `auto` chose anew, and differences were of two."""
+        """The integrator that suits the numbers as stated, for all x. If `auto` chose anew for each x, motions of two
+        integrators could be differenced."""
         try:
             return Evaluator(self.numbers.case_at(self.numbers.initial), in_background=False).integrator
         except CaseError:  # the first motion says why
@@ -194,7 +195,11 @@ class Predictions:
         return _models(one), _models(other), apart
 
     def _pairs(self, balanced: list[int], x: FloatArray) -> list[Pair]:
-        """Those of the numbers that the balance depends on, at x or, where that is the same, anywhere."""
+        """The scenes with each of some numbers larger and smaller, about x.
+
+        About the middle of the bounds where masses, loads and velocities are linear functions of the numbers: slopes
+        are the same everywhere then.
+        """
         if self._anywhere is None:
             middle = 0.5 * (self.numbers.lower + self.numbers.upper)
             pairs = [self._pair(i, middle) for i in balanced]
@@ -202,7 +207,7 @@ class Predictions:
         return self._anywhere or [self._pair(i, x) for i in balanced]
 
     def _is_straight(self, balanced: list[int], middle: FloatArray, pairs: list[Pair]) -> bool:
-        """Whether masses, loads and velocities follow from all numbers in straight lines between the bounds."""
+        """Whether masses, loads and velocities are linear functions of all numbers between their bounds."""
         base = _models(self.numbers.case_at(middle))
         random = np.random.default_rng(0)
         for _ in range(3):
@@ -211,7 +216,7 @@ class Predictions:
                 found = _models(self.numbers.case_at(x))
             except CaseError:  # not all that is between the bounds goes together
                 return False
-            for name, key in product(base, READ):
+            for name, key in product(base, EQUATION_ARRAYS):
                 expected = getattr(base[name], key).copy()
                 for (one, other, apart), i in zip(pairs, balanced, strict=True):
                     change = getattr(one[name], key) - getattr(other[name], key)

@@ -37,12 +37,12 @@ def case_at(case: Case, keys: Sequence[str], x: FloatArray) -> Case:
 def prepared(case: Case) -> Case:
     """The case with the measured responses alone, with its design variables at their initial values."""
     assert case.fit is not None
-    # no reduction is taken: one that only the general kernels have makes the case one for these
+    # the reduction is never computed: one that only kernels of general scenes have makes the case such a scene
     general = next(kind.name for kind in REDUCTIONS.values() if not kind.springs)
     objectives = tuple(Objective(each.name, each.response, general, each.load_case) for each in case.fit.series)
     return replace(
         case,
-        members=tuple(_settled(case, group) for group in case.members),
+        members=tuple(_at_initial_values(case, group) for group in case.members),
         objectives=objectives,
         combine=None,
         constraints=(),
@@ -53,8 +53,8 @@ def prepared(case: Case) -> Case:
     )
 
 
-def _settled(case: Case, group: MemberGroup) -> MemberGroup:
-    """A group whose laws have the initial values of the case's design variables."""
+def _at_initial_values(case: Case, group: MemberGroup) -> MemberGroup:
+    """The group with the initial values of design variables in its laws."""
     laws = list(group.laws)
     for variable in case.variables:
         for name, place in zip(variable.groups, variable.laws, strict=True):

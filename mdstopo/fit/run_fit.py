@@ -21,7 +21,11 @@ SAME_LEVEL = 1e-6
 
 @dataclass(frozen=True)
 class Start:
-    """One start that has come to its end: x (p,) where, deviation (n,) of each value; the rest as of `Minimum`."""
+    """A start that has ended.
+
+    begin, x (p,): the estimates at its beginning and its end. deviation (n,): of each measured value. The other fields
+    are those of `Minimum`.
+    """
 
     begin: FloatArray
     x: FloatArray
@@ -34,11 +38,12 @@ class Start:
 
 @dataclass(frozen=True)
 class Tried:
-    """One evaluation: in which start, x (p,) where, and the root mean square that is left in each series (S,)."""
+    """One evaluation of a start: the start's number, the estimates x (p,), the root mean square of the misfit in each
+    series (S,)."""
 
     start: int
     x: FloatArray
-    left: FloatArray
+    root_mean_squares: FloatArray
 
 
 @dataclass
@@ -100,7 +105,7 @@ def run_fit(
     passing: is given what is known after each evaluation of a start.
     """
     run = FitRun(problem) if before is None else before
-    counted = problem.simulations  # of these motions of the problem
+    counted = problem.simulations  # motions that `run.simulations` has of this problem already
     run.status, run.minimum, run.statistics = "running", None, None
     run.trace = [each for each in run.trace if each.start < len(run.starts)]
 
@@ -117,13 +122,13 @@ def run_fit(
         nonlocal counted
         count()
         _conclude(run)
-        if run.concluded:  # the same again
+        if run.concluded:  # the run that is resumed has counted the motion at this minimum
             counted = problem.simulations
         run.concluded = True
 
     def seen(evaluated: Evaluated) -> None:
         run.latest = evaluated
-        run.trace.append(Tried(len(run.starts), evaluated.x, problem.left(evaluated.misfit)))
+        run.trace.append(Tried(len(run.starts), evaluated.x, problem.root_mean_squares(evaluated.misfit)))
         count()
         passing(run)
 

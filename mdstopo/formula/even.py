@@ -1,8 +1,9 @@
-"""Whether formulas of a law are even: few values tell all others, wherever no switch changes its side.
+"""Whether formulas of a law are even: between switches all their values can be interpolated from few.
 
-Such are polynomials of elongation, rate and free length, and roots and powers of what is linear in these. What else
-there is may be as sharp as a kink within a short way and flat on both sides of it: sums of `tanh`, `exp(-x^2)`,
-`1/(1 + x^2)`. A switch is even where its margin is linear in elongation and rate and knows no free length.
+Polynomials of elongation, rate and free length are even, and so are roots and powers of expressions that are linear in
+these. Others may bend within a short interval as sharply as at a kink and be flat on both sides of it (`tanh`,
+`exp(-x^2)`, `1/(1 + x^2)`), which few values do not show. A switch is even where its margin is linear in elongation and
+rate and does not depend on the free length.
 """
 
 from __future__ import annotations

@@ -40,12 +40,12 @@ from mdstopo.formula.tree import NUMBER, Expression, name, names_in, number, ope
 FORCE, LOWEST, FIRST = 0, 1, 2
 #: operations of all groups at most
 MOST_OPERATIONS = 20_000
-#: a margin where no switch is evaluated
-NONE = number(1e300)
-#: slopes that are smaller than the one are none, and those that are larger than the other infinite
+#: stands for the smallest margin where no switch is evaluated
+NO_MARGIN = number(1e300)
+#: slopes below the one count as zero, those above the other as infinite
 NOUGHT, LARGE = number(1e-300), number(1e100)
-#: operations that have no value for some operands
-LIMITED = ("sqrt", "^", "powlog", "log", "asin", "acos", "/")
+#: functions that have no value for some operands; for powers and quotients the second operand decides (`_may_fail`)
+PARTIAL = ("sqrt", "powlog", "log", "asin", "acos")
 
 
 class Guard(NamedTuple):
@@ -154,21 +154,21 @@ def program(force: str | None, energy: str | None, damping: str | None, names: t
     words = [*(f"p {place}" for place in range(len(names))), "l0"]
     near = [_near(switch.margin) for switch in found.switches]
     margins = [divide(switch.margin, size) for switch, size in zip(found.switches, near, strict=True)]
-    guards = limited([(f, ONE), (v, ONE), *((each.margin, each.relevant) for each in found.switches)])
+    guards = guards_of([(f, ONE), (v, ONE), *((each.margin, each.relevant) for each in found.switches)])
     groups = [
         group_of((f, derivative(f, "x"), derivative(f, "xd"), v, derivative(v, "x")), guards),
         group_of((lowest_of(margins, found.switches),)),
     ]
     for word in words:
         both = derivative(f, word), derivative(v, word)
-        groups.append(group_of(both, limited([(slope, ONE) for slope in both])))
+        groups.append(group_of(both, guards_of([(slope, ONE) for slope in both])))
     for (margin, relevant), size, value in zip(found.switches, near, margins, strict=True):
         slopes = tuple(divide(derivative(margin, word), size) for word in MOTION)
         groups.append(group_of((value, *slopes, relevant)))
     for (margin, _), size in zip(found.switches, near, strict=True):
         groups += [group_of((divide(derivative(margin, word), size),)) for word in words]
     by_time = derivative(f, "t")
-    groups.append(group_of((by_time,), limited([(by_time, ONE)])))
+    groups.append(group_of((by_time,), guards_of([(by_time, ONE)])))
     sharp = sharp_switches(f, [switch.margin for switch in found.switches], MOTION)
     even = is_even((f, v), [switch.margin for switch in found.switches])
     return Program(tuple(groups), len(names), len(found.switches), idle_sides((f, v), guards), sharp, even)
@@ -196,16 +196,16 @@ def _near(margin: Expression) -> Expression:
 
 def lowest_of(margins: list[Expression], switches: tuple[Switch, ...]) -> Expression:
     """The smallest margin of the switches that are evaluated, each with the sign that its mode makes positive."""
-    lowest = NONE
+    lowest = NO_MARGIN
     for place, (margin, switch) in enumerate(zip(margins, switches, strict=True)):
         signed = choose(is_set(place), margin, negate(margin))
         if not is_number(switch.relevant, 1.0):
-            signed = choose(operation(">", switch.relevant, HALF), signed, NONE)
-        lowest = signed if lowest is NONE else call("min", lowest, signed)
+            signed = choose(operation(">", switch.relevant, HALF), signed, NO_MARGIN)
+        lowest = signed if lowest is NO_MARGIN else call("min", lowest, signed)
     return lowest
 
 
-def limited(roots: list[tuple[Expression, Expression]]) -> list[Guard]:
+def guards_of(roots: list[tuple[Expression, Expression]]) -> list[Guard]:
     """The operations in formulas that may have no value, each with a number that is 1 where it is evaluated."""
     ways = ways_to(*roots)
     return [Guard(part, way) for part, way in ways.items() if _may_fail(part) and not is_number(way, 0.0)]
@@ -214,6 +214,6 @@ def limited(roots: list[tuple[Expression, Expression]]) -> list[Guard]:
 def _may_fail(part: Expression) -> bool:
     """Whether an operation has no value for some operands."""
     if part.operator not in ("^", "/"):
-        return part.operator in LIMITED
+        return part.operator in PARTIAL
     last = part.operands[1]
     return last.operator != NUMBER or (part.operator == "^" and last.value != round(last.value))

@@ -9,7 +9,7 @@ import functools
 from typing import NamedTuple
 
 from mdstopo.formula.calculus import ONE, call, derivative, is_number, substituted
-from mdstopo.formula.law_formulas import Group, by_place, group_of, limited, lowest_of
+from mdstopo.formula.law_formulas import Group, by_place, group_of, guards_of, lowest_of
 from mdstopo.formula.parser import TIME, parse
 from mdstopo.formula.smooth_modes import has_bits, smooth
 from mdstopo.formula.tree import NUMBER, Expression, name, names_in
@@ -57,7 +57,10 @@ def response_program(
     found = smooth((root,), (*moving, TIME))
     (f,) = found.formulas
     margins = [switch.margin for switch in found.switches]
-    groups = [group_of((f, derivative(f, TIME)), limited([(f, ONE)])), group_of((lowest_of(margins, found.switches),))]
+    groups = [
+        group_of((f, derivative(f, TIME)), guards_of([(f, ONE)])),
+        group_of((lowest_of(margins, found.switches),)),
+    ]
     groups += _slopes(f, moving)
     for switch in found.switches:
         groups.append(group_of((switch.margin, derivative(switch.margin, TIME), switch.relevant)))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from mdstopo.formula.calculus import ONE, derivative, substituted
 from mdstopo.formula.formula_values import value_of
-from mdstopo.formula.law_formulas import Group, by_place, group_of, limited, lowest_of
+from mdstopo.formula.law_formulas import Group, by_place, group_of, guards_of, lowest_of
 from mdstopo.formula.parser import TIME, parse
 from mdstopo.formula.smooth_modes import smooth
 
@@ -34,7 +34,7 @@ def time_program(text: str, names: tuple[str, ...]) -> TimeProgram:
     rate = derivative(f, TIME)
     margins = [switch.margin for switch in found.switches]
     groups = [
-        group_of((f, rate, derivative(rate, TIME)), limited([(f, ONE)])),
+        group_of((f, rate, derivative(rate, TIME)), guards_of([(f, ONE)])),
         group_of((lowest_of(margins, found.switches),)),
     ]
     groups += [group_of((each.margin, derivative(each.margin, TIME), each.relevant)) for each in found.switches]

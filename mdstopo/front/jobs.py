@@ -19,7 +19,7 @@ from mdstopo.session.combining import NoUtopiaError
 from mdstopo.session.compiling_apart import compile_apart
 from mdstopo.session.run_session import run_session
 from mdstopo.starts.callbacks import ignore
-from mdstopo.starts.evaluator_interface import Engine, even, problem_of
+from mdstopo.starts.evaluator_interface import Engine, equal_weights, problem_of
 from mdstopo.starts.getting_ready import get_ready
 from mdstopo.status import RunStatus
 from mdstopo.workers.worker_pool import Parent, Perform, StoppedError
@@ -84,7 +84,7 @@ def first(case: Case) -> FloatArray:
 
 
 def ready_engine(setting: Setting) -> Engine:
-    """The case's engine, its kernels loaded in the one order that makes results repeat to the bit (`ready`)."""
+    """The case's engine, its kernels loaded in the one order that makes results repeat to the bit (`get_ready`)."""
     found = _engines.get(setting.case_key)
     if found is None:
         compile_apart(setting.case, ignore)  # on a machine where nothing has been compiled yet
@@ -94,7 +94,7 @@ def ready_engine(setting: Setting) -> Engine:
 
             for kind in kinds(found):
                 compile_apart(kind, ignore)
-        get_ready(setting.case, found, problem_of(found, even(setting.case)), None)
+        get_ready(setting.case, found, problem_of(found, equal_weights(setting.case)), None)
         _engines[setting.case_key] = found
         if len(_engines) > _KEPT:
             _engines.popitem(last=False)

@@ -27,9 +27,9 @@ from mdstopo.plan.pricing_rounds import members_part
 from mdstopo.plan.solve_task import Found, Result, Task, failed, front_key
 from mdstopo.plan.stored_tasks import begun_part, read_begun, read_tasks, tasks_part
 from mdstopo.session.compiling_apart import compile_apart
-from mdstopo.session.shortfall import of_many
+from mdstopo.session.shortfall import stalled_runs
 from mdstopo.starts.callbacks import ignore, never
-from mdstopo.starts.evaluator_interface import even
+from mdstopo.starts.evaluator_interface import equal_weights
 from mdstopo.starts.single_start import NOTHING_VARIES, first_design, replaced, unshared
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
@@ -39,6 +39,7 @@ from mdstopo.store.contents import Datasets, case_part
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
 from mdstopo.store.same_case import describe
+from mdstopo.store.set_keys import set_keys
 from mdstopo.store.store_errors import WriteError
 from mdstopo.store.writing import write_result
 from mdstopo.workers.worker_pool import Lost, StoppedError
@@ -239,7 +240,7 @@ class _FrontRun:
         self.quality = quality(self.case, front) if front is not None else None
         if front is not None:
             ends = [(each.status, each.kkt) for each in front.points if each is not None]
-            self.warnings += of_many(ends, "points", self.case.optimizer.tolerance)
+            self.warnings += stalled_runs(ends, "points", self.case.optimizer.tolerance)
         if path is not None:
             self.save(path, status, reason, front)
         tasks = tuple(self.taken.values())
@@ -255,7 +256,7 @@ class _FrontRun:
     def request(self) -> Request:
         """The plan's request, with the designs to begin with."""
         assert self.case.combine is not None
-        problem = make_engine(self.case).problem(even(self.case))
+        problem = make_engine(self.case).problem(equal_weights(self.case))
         stated, first = first_design(self.case, problem, None)
         if words := unshared(self.case, None):
             self.notify(words)
@@ -395,7 +396,7 @@ class _FrontRun:
             "starts": self.ask.starts,
             "seed": chosen.seed,
         }
-        self.settings |= {f"set {key}": value for key, value in self.case.overrides.items()}
+        self.settings |= set_keys(self.case)
 
     def checkpoint(self, path: Path) -> None:
         """Save in the middle; a full disk then is no reason to lose the front."""

@@ -22,7 +22,7 @@ from mdstopo.plan.priced_designs import in_case, with_all
 from mdstopo.plan.solve_task import Found, case_key, failed
 from mdstopo.plan.stored_tasks import read_tasks, tasks_part
 from mdstopo.session.compiling_apart import compile_apart
-from mdstopo.session.shortfall import of_many
+from mdstopo.session.shortfall import stalled_runs
 from mdstopo.starts.callbacks import ignore, never
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
@@ -31,6 +31,7 @@ from mdstopo.store.checkpoint import INTERVAL, Checkpointer
 from mdstopo.store.contents import Datasets, case_part
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
+from mdstopo.store.set_keys import set_keys
 from mdstopo.store.store_errors import WriteError
 from mdstopo.store.writing import write_result
 from mdstopo.workers.worker_pool import Lost
@@ -236,7 +237,7 @@ class _Sweep:
     def stalled(self) -> tuple[str, ...]:
         """The warning about runs that stalled; their tolerances may differ."""
         found = [self.solved[key] for key in self.runs]
-        return of_many([(each.status, each.kkt) for each in found], "runs")
+        return stalled_runs([(each.status, each.kkt) for each in found], "runs")
 
     def verdict(self) -> tuple[RunStatus, str]:
         """How the runs have ended."""
@@ -288,7 +289,8 @@ class _Sweep:
                 part |= {f"variables/{i}/{name}": values for name, values in space.named(design).items()}
         datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
         datasets |= tasks_part(tasks, self.base, "sweep/tasks")
-        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, {}, self.warnings)
+        settings = set_keys(self.base)
+        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, settings, self.warnings)
 
 
 def shortest(value: float) -> str:

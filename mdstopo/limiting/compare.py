@@ -13,6 +13,7 @@ from mdstopo.case.arrays import FloatArray
 from mdstopo.case.design.stages import stage_count
 from mdstopo.case.model import Case
 from mdstopo.limiting.bounds import Bound, bounds
+from mdstopo.starts.constraint_columns import relative_violations
 from mdstopo.store.store_errors import StoreError
 from mdstopo.store.whole_front import whole_front
 
@@ -92,18 +93,8 @@ def _best(case: Case, view: ResultView) -> dict[str, float | None]:
 def violations(case: Case, view: ResultView) -> FloatArray:
     """(K + 1,) by how much each iterate exceeds the limit that it breaks most, relative to the bound; at most 0 where
     it keeps all."""
-    excess = np.asarray(view.array("iterations/constraints"), dtype=np.float64)
-    most = np.full(len(excess), -np.inf)
-    for i, row in enumerate(case.constraints):
-        most = np.maximum(most, exceeded(row.sense, excess[:, i]) / (abs(row.bound) or 1.0))
-    return most
-
-
-def exceeded(sense: str, excess: FloatArray) -> FloatArray:
-    """By how much values break a bound, positive where they do, in their own unit. excess: the values less the bound;
-    sense: what it asks for, `limit`, `at_least` or `equals`."""
-    over: FloatArray = {"limit": excess, "at_least": -excess, "equals": np.abs(excess)}[sense]
-    return over
+    values = np.asarray(view.array("iterations/constraints"), dtype=np.float64)
+    return np.asarray(relative_violations(case, values).max(axis=1, initial=-np.inf))
 
 
 def of_last_stage(case: Case, view: ResultView) -> NDArray[np.bool_]:

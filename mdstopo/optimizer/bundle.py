@@ -22,6 +22,8 @@ ROOM, LEAST, MOST = 2e7, 8, 160
 SAME = 1e-9
 #: share of a row's slope by which a row from elsewhere may differ from it and still be the same peak, seen earlier
 SEEN_AGAIN = 0.1
+#: how much the vector of a norm changes in a box, in its own length, up to which the norm is a line there
+STRAIGHT = 1e-6
 
 
 @dataclass(slots=True)
@@ -147,6 +149,26 @@ class Bundle:
         vector = self.vector.copy()
         vector[:, 0] -= np.where(self.norm, 0.0, beyond)
         return self._with(vector=vector, offset=self.offset + beyond)
+
+    def relevant(self, width: Floats) -> tuple[Bools, "Bundle"]:
+        """The rows that may carry a multiplier in a box of half width (N,) around the iterate, norms that hardly bend
+        there as lines: which of these rows they are (K,), and themselves.
+
+        The others lie below the highest row of the objective, or below the limit, in all of the box.
+        """
+        assert not isinstance(self.slope, Stack)
+        along, across = np.abs(self.slope) @ width, np.zeros(len(self))
+        if self.across.shape[1]:
+            across = np.abs(self.across) @ width
+        reach, values = np.hypot(along, across), self.values()
+        least = np.zeros(int(self.group.max(initial=0)) + 1)
+        least[0] = (values - reach)[self.group == 0].max(initial=-np.inf)
+        kept = values + reach >= least[self.group]
+        straight = self.norm & (reach <= STRAIGHT * np.hypot(self.vector[:, 0], self.vector[:, 1]))
+        vector = np.where(straight[:, None], np.stack([values, np.zeros(len(self))], axis=1), self.vector)
+        slope = np.where(straight[:, None], self.slopes_at(np.zeros(len(width))), self.slope)
+        offset = np.where(straight, np.nan, self.offset)
+        return kept, self._with(vector=vector, slope=slope, offset=offset).subset(kept)
 
     def subset(self, places: Ints | Bools) -> "Bundle":
         """A bundle of some of the rows."""

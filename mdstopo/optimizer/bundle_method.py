@@ -343,31 +343,33 @@ class BundleMethod:
     def _steer(self, state: GsaoState, rows: Bundle, around: Around, here: Floats) -> Trial:
         """The trial, at penalties that make it take away enough of the violation that can go in the box.
 
-        Raises `state.penalty` until it does, and else lets it follow the multipliers. here (J + 1,): the groups' levels
-        at the iterate.
+        Raises `state.penalty` of violated constraints until it does; other penalties follow the multipliers.
+        here (J + 1,): the groups' levels at the iterate.
         """
         trial = around.solve(rows, state.penalty)
         if not len(state.penalty):
             return trial
         reach = around.reach(rows.subset(rows.group > 0))
         tiny = max(NOTHING * self.settings.tolerance, ROUNDING * float(reach.max(initial=0.0)))
+        # as in the merit, so that penalties raised in proportion lead to the least of this sum
+        weight = state.penalty / state.penalty.max()
 
         def violation(levels: Floats) -> float:
-            return float(np.maximum(levels[1:], 0.0).sum())
+            return float(weight @ np.maximum(levels[1:], 0.0))
 
         if violation(trial.levels) > tiny:
-            least = around.least_violation(rows, len(state.penalty))
+            least = around.least_violation(rows, weight)
             low = violation(least.levels)
             enough = low + (1.0 - STEER) * max(violation(here) - low, 0.0) + tiny
             for _ in range(RAISES):
-                if violation(trial.levels) <= enough:
+                too_low = trial.violates(rows, state.penalty, tiny / len(state.penalty))
+                if violation(trial.levels) <= enough or not too_low.any():
                     break
-                violated = trial.levels[1:] > tiny / len(state.penalty)
-                state.penalty = np.where(violated, RAISE * state.penalty, state.penalty)
+                state.penalty = np.where(too_low, RAISE * state.penalty, state.penalty)
                 trial = around.solve(rows, state.penalty)
-        carried = np.bincount(rows.group, weights=trial.multipliers, minlength=len(here))[1:]
+        carried = trial.carried(rows, len(state.penalty))
         state.penalty = np.where(
-            trial.levels[1:] > tiny,
+            trial.violates(rows, state.penalty, tiny),
             state.penalty,
             np.maximum(
                 np.maximum(MARGIN * carried, PENALTY_FALL * state.penalty), LEAST_PENALTY * self.first_penalty(rows)

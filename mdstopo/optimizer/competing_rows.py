@@ -44,6 +44,8 @@ NOTHING = 1e-3
 #: bounds of multipliers, in largest gradient entries of the objective, with which the residual's subproblem is solved
 #: where it cannot be with higher ones
 HIGHEST = 1e6
+#: the least share of its penalty that the rows of a violated constraint carry: all of it, but for rounding
+AT_PENALTY = 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +59,18 @@ class Trial:
     levels: Floats
     curved: float
     solved: bool
+
+    def carried(self, rows: Bundle, constraints: int) -> Floats:
+        """The sum of the multipliers of each constraint's rows, (J,)."""
+        return np.asarray(np.bincount(rows.group, weights=self.multipliers, minlength=constraints + 1)[1:], dtype=float)
+
+    def violates(self, rows: Bundle, penalty: Floats, tiny: float) -> Bools:
+        """(J,) which constraints the model violates by more than `tiny`, as their penalties (J,) are too low.
+
+        The rows of such a constraint carry all of its penalty. Where they carry less, it is high enough to keep the
+        constraint, and what is left of the violation is rounding of the subproblem.
+        """
+        return np.asarray((self.levels[1:] > tiny) & (self.carried(rows, len(penalty)) >= AT_PENALTY * penalty))
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +103,8 @@ class Around(Protocol):
     def solve(self, rows: Bundle, penalty: Floats) -> Trial:
         """Solve the subproblem of these rows, where violations of the constraints cost penalty (J,)."""
 
-    def least_violation(self, rows: Bundle, constraints: int) -> Trial:
-        """The step to the least sum of violations of so many constraints."""
+    def least_violation(self, rows: Bundle, weight: Floats) -> Trial:
+        """The step to the least sum of violations of the constraints, each times weight (J,)."""
 
     def reach(self, rows: Bundle) -> Floats:
         """By how much rows can change in the box, at most, (K,)."""
@@ -171,8 +185,8 @@ class _DenseAround:
     def solve(self, rows: Bundle, penalty: Floats) -> Trial:
         return subproblem(rows, self.x, self.space, self.box, penalty, self.curvature)
 
-    def least_violation(self, rows: Bundle, constraints: int) -> Trial:
-        return least_violation(rows, self.x, self.space, self.box, np.ones(constraints))
+    def least_violation(self, rows: Bundle, weight: Floats) -> Trial:
+        return least_violation(rows, self.x, self.space, self.box, weight)
 
     def reach(self, rows: Bundle) -> Floats:
         return np.asarray(np.abs(_matrix(rows)) @ (self.box[1] - self.box[0]))
@@ -202,7 +216,24 @@ def subproblem(
       curvature: B, the matrix of the quadratic term.
 
     Fixed variables and linear rows without a free one are left out; the trial keeps box and linear rows to rounding.
+    In a very small box levels that are far apart, and vectors far longer than they change, take the digits away. What
+    cannot be solved for it is solved with the rows alone that matter in the box.
     """
+    trial = _subproblem_of(bundle, x, space, box, penalty, curvature)
+    if trial.solved:
+        return trial
+    kept, rows = bundle.relevant(np.maximum(box[1] - x, x - box[0]))
+    trial = _subproblem_of(rows, x, space, box, penalty, curvature)
+    multipliers = np.zeros(len(bundle))
+    multipliers[kept] = trial.multipliers
+    levels = largest_of_groups(bundle.values_at(trial.x - x), bundle.group, len(penalty) + 1)
+    return replace(trial, multipliers=multipliers, levels=levels)
+
+
+def _subproblem_of(
+    bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], penalty: Floats, curvature: Curvature
+) -> Trial:
+    """Solve the model of these rows, as `subproblem` has it."""
     lower, upper = box[0] - x, box[1] - x
     free = upper > lower
     d, linear = np.zeros(len(x)), np.zeros(len(space.linear))

@@ -210,10 +210,10 @@ class _WideAround:
         linear = found.theta[K : K + len(self.model.linear)]
         return Trial(trial, np.maximum(found.theta[:K], 0.0), linear, levels, found.curved, found.solved)
 
-    def least_violation(self, rows: Bundle, constraints: int) -> Trial:
+    def least_violation(self, rows: Bundle, weight: Floats) -> Trial:
         only = rows.subset(rows.group > 0)
-        steepest = float(only.steepest.max(initial=0.0))
-        return self.flat(max(NEXT_TO_NONE * steepest, 1e-300)).solve(only, np.ones(constraints))
+        steepest = float((weight[only.group - 1] * only.steepest).max(initial=0.0))
+        return self.flat(max(NEXT_TO_NONE * steepest, 1e-300)).solve(only, weight)
 
     def reach(self, rows: Bundle) -> Floats:
         unit = self.model.unit[:: SPARSE if len(self.model.unit) > 1 else 1]

@@ -32,9 +32,8 @@ def in_contest(tasks: Sequence[Task]) -> list[Task]:
 def race(
     alone: Sequence[Task], contests: Sequence[Sequence[Task]], tolerance: float
 ) -> Generator[list[Task], list[Result], Solved]:
-    """Solve tasks that stand alone, and those that compete (`in_contest`), in quotas; yields
-    tasks, is
-    sent their results.
+    """Solve tasks that stand alone, and those that compete (`in_contest`) in quotas. Yields tasks, and is sent their
+    results.
 
     A result is a state where the task has a quota, or what was found where an earlier process has ended it.
     """

@@ -17,17 +17,16 @@ from numpy.typing import NDArray
 from mdstopo._version import __version__
 from mdstopo.case.model import Case
 from mdstopo.evaluators import make_engine
-from mdstopo.optimizer.interface import Optimizer, make, run
+from mdstopo.optimizer.interface import Optimizer, run
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
 from mdstopo.plan.priced_designs import packed, unpacked
 from mdstopo.plan.pricing_rounds import Rounds
-from mdstopo.settings.optimizer_presets import settings
 from mdstopo.starts.callbacks import never
-from mdstopo.starts.constraint_columns import constraint_values
+from mdstopo.starts.constraint_columns import constraint_values, relative_violations
 from mdstopo.starts.evaluator_interface import Engine
-from mdstopo.starts.single_start import counted, soften
+from mdstopo.starts.single_start import make_optimizer, soften, with_evaluations_before
 from mdstopo.status import RunStatus
 from mdstopo.store.same_case import describe
 from mdstopo.workers.worker_pool import StoppedError
@@ -77,8 +76,8 @@ class Found:
     """What a task has found.
 
     alpha (n,): its best design, as the optimiser's x (`case.space`), or where candidates are priced with its members
-    (`priced_designs`), as `Task.start` is; objectives (m,): all raw G there, NaN where it
-    could not be evaluated; combined: U; visited (K, m): raw G of every iterate, NaN of objectives that were not
+    (`priced_designs`), as `Task.start` is; objectives (m,): all raw G there, NaN where it could not be evaluated;
+    combined: U; visited (K, m): raw G of every iterate, NaN of objectives that were not
     simulated; the last row is the design that is kept and has all. violations (K,): the largest excess of each over a
     constraint, relative to its bound; violation: that of alpha. kkt: the projected residual at the last iterate,
     relative to the largest gradient entry, NaN where another design is kept. key: empty for what is not to be used
@@ -169,7 +168,7 @@ def _gone(
     case: Case, problem: Problem, task: Task, stop: Callable[[], bool] | None, keep: Callable[[State], None] | None
 ) -> State:
     """The state of the optimiser as far as a task goes; arguments as of `solve`. Raises StoppedError."""
-    optimizer = _optimizer(case, problem, task)
+    optimizer = make_optimizer(case, problem, max_iterations=task.iterations)
     first = task.begun if task.begun is not None else _first(optimizer, task, stop)
     latest = first
 
@@ -237,20 +236,6 @@ def _is_there(task: Task, state: State) -> bool:
     return task.is_through(state) or (task.iterate >= 0 and state.iteration >= task.iterate - 1)
 
 
-def _optimizer(case: Case, problem: Problem, task: Task) -> Optimizer:
-    chosen = case.optimizer
-    return make(
-        problem,
-        settings(
-            chosen.preset,
-            dict(chosen.options),
-            max_iterations=task.iterations,
-            tolerance=chosen.tolerance,
-            optimizer=chosen.name,
-        ),
-    )
-
-
 def _first(optimizer: Optimizer, task: Task, stop: Callable[[], bool] | None) -> State:
     """The state with which a task begins. Raises StoppedError where it is stopped before there is one."""
     if not (task.softened and hasattr(optimizer.problem, "softened")):
@@ -258,7 +243,7 @@ def _first(optimizer: Optimizer, task: Task, stop: Callable[[], bool] | None) ->
     soft = soften(optimizer.settings, optimizer.problem, task.start, stop or never)
     if soft is None:
         raise StoppedError
-    return counted(optimizer.start(soft.best_alpha), soft.evaluations)
+    return with_evaluations_before(optimizer.start(soft.best_alpha), soft.evaluations)
 
 
 def _end(engine: Engine, case: Case, task: Task, key: str, state: State) -> Found:
@@ -307,9 +292,6 @@ def _violations(case: Case, state: State) -> Floats:
 
 
 def _largest(case: Case, values: Floats) -> Floats:
-    """The largest excess (K,) of constraint values (K, n_con), relative to the bounds; NaN where one is not known."""
-    worst = np.zeros(len(values))
-    for row, excess in zip(case.constraints, values.T, strict=True):
-        own = {"limit": excess, "at_least": -excess, "equals": np.abs(excess)}[row.sense] / (abs(row.bound) or 1.0)
-        worst = np.maximum(worst, own)
-    return worst
+    """The largest excess (K,) of constraint values (K, n_con), relative to the bounds; 0 where all are kept, NaN where
+    one is not known."""
+    return np.asarray(relative_violations(case, values).max(axis=1, initial=0.0))

@@ -2,8 +2,8 @@
 
 Every evaluation of every solve gives a point in objective space, better or worse. Most are left behind; but one may be
 better than a point of the front, or lie where the front has a gap, because no direction that was asked for leads there.
-Only the values of all of them are kept. The few designs that are asked for come from going the way of their solve once
-more (`tasks.Task.iterate`).
+Of all of them only the values are kept. The few designs that are needed are computed again, by repeating their solve up
+to that iterate (`solve_task.Task.iterate`).
 """
 
 import math

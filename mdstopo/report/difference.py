@@ -16,6 +16,7 @@ from mdstopo.plots.same_members import family, same_members
 from mdstopo.plots.scenery import Floats
 from mdstopo.plots.source import Source
 from mdstopo.report.report_tables import constraint_rows, objective_rows
+from mdstopo.store.set_keys import without_set_keys
 from mdstopo.store.store_errors import StoreError
 
 #: change of alpha that counts; shares of the range from which on a member is there, and below which it is not
@@ -147,7 +148,7 @@ def _outcome(first: Source, second: Source) -> list[Pair]:
         rows = view.arrays.get("iterations/combined")
         own: dict[str, Any] = {"made by": view.kind, "status": view.status}
         own |= {} if rows is None else {"iterations": len(rows) - 1}
-        own |= {key: value for key, value in view.settings.items() if not key.startswith("set ")}
+        own |= without_set_keys(view.settings)
         own |= {key: view.provenance.get(key) for key in ("mdstopo", "numpy", "numba", "platform")}
         told.append(own)
     names = list(dict.fromkeys([*told[0], *told[1]]))

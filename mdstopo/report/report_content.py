@@ -29,6 +29,8 @@ from mdstopo.plots.views import upright
 from mdstopo.plots.windows_of_laws import active_windows
 from mdstopo.report.fit_tables import fit_part
 from mdstopo.report.report_tables import best_iterate, constraint_rows, member_peaks, objective_rows, parts, peak_of
+from mdstopo.store.json_values import json_value
+from mdstopo.store.set_keys import without_set_keys
 from mdstopo.store.whole_front import whole_front
 
 Floats = NDArray[np.float64]
@@ -52,12 +54,12 @@ def content(source: Source) -> dict[str, Any]:
         "title": source.title,
         "status": view.status.replace("_", " "),
         "reason": view.reason,
-        "kkt": _plain(_rounded(kkts[-1:], 2))[0] if view.kind == "run" and len(kkts) else None,
+        "kkt": _rounded(kkts[-1:], 2)[0] if view.kind == "run" and len(kkts) else None,
         "kind": view.kind,
         "warnings": list(view.warnings),
         "case": view.case_text,
         "versions": dict(view.provenance),
-        "settings": {key: value for key, value in view.settings.items() if not key.startswith("set ")},
+        "settings": without_set_keys(view.settings),
         "objectives": [
             {"name": name, "unit": unit_of_value(objectives[name]), "what": _what(case, name),
              "load_case": objectives[name].load_case, "over_time": objectives[name].over_time,
@@ -96,8 +98,8 @@ def content(source: Source) -> dict[str, Any]:
             "kept": kept_iterates(case, view).tolist() if view.kind == "run" else None,
             "best": best_iterate(source),
         }
-        page["summary"] = _plain(objective_rows(source))
-        page["limits"] = _plain(constraint_rows(source))
+        page["summary"] = json_value(objective_rows(source))
+        page["limits"] = json_value(constraint_rows(source))
     if "pareto/objectives" in view.arrays:
         front = whole_front(view)
         page["front"] = {
@@ -317,8 +319,7 @@ def _rounded(array: Any, digits: int = 6) -> Any:
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.where((values != 0.0) & np.isfinite(values), np.floor(np.log10(np.abs(values))), 0.0)
     factor = 10.0 ** np.clip(digits - 1 - size, -300, 300)
-    plain = np.where(np.isfinite(values), np.round(values * factor) / factor, np.nan)
-    return _plain(plain.tolist())
+    return json_value(np.where(np.isfinite(values), np.round(values * factor) / factor, np.nan))
 
 
 def _rounded_part(value: Any) -> Any:
@@ -329,11 +330,3 @@ def _rounded_part(value: Any) -> Any:
         numbers = all(isinstance(each, (int, float)) for each in value)
         return _rounded(value) if numbers and value else [_rounded_part(each) for each in value]
     return value
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_plain(each) for each in value]
-    if isinstance(value, dict):
-        return {key: _plain(each) for key, each in value.items()}
-    return None if value != value else value

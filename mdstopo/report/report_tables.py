@@ -9,10 +9,11 @@ from mdstopo.case.design.stages import stage_count
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case
 from mdstopo.case.responses.response_units import constrained, unit_of_bound, unit_of_value
-from mdstopo.limiting.compare import exceeded, kept_iterates, of_last_stage, violations
+from mdstopo.limiting.compare import kept_iterates, of_last_stage, violations
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.scenery import Floats
 from mdstopo.plots.source import Source
+from mdstopo.starts.constraint_columns import exceeded
 from mdstopo.store.result_reader import ResultView
 
 #: samples between the neighbours of the largest sample, to find a peak; members that are listed

@@ -7,7 +7,6 @@ it up. It is read again only where it has changed.
 from __future__ import annotations
 
 import json
-import math
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -22,6 +21,7 @@ from mdstopo.case.responses.response_units import unit_of_value
 from mdstopo.plots.animation import still
 from mdstopo.plots.source import Source
 from mdstopo.report.fit_tables import fit_part
+from mdstopo.store.json_values import json_value
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.store_errors import StoreError
 
@@ -105,9 +105,9 @@ def state_of(view: ResultView, source: Source) -> dict[str, Any]:
         visited = [part for path, part in view.under("pareto/visited").items()]
         cloud = np.concatenate(visited)[-POINTS:] if visited else np.zeros((0, len(names)))
         state["front"] = {
-            "objectives": _plain(arrays["pareto/objectives"]),
+            "objectives": json_value(arrays["pareto/objectives"]),
             "status": status,
-            "visited": _plain(cloud),
+            "visited": json_value(cloud),
             "done": sum(word not in ("running", "", "waiting") for word in status),
         }
     if "sweep/objectives" in arrays:
@@ -115,7 +115,7 @@ def state_of(view: ResultView, source: Source) -> dict[str, Any]:
         state["sweep"] = {
             "keys": keys,
             "values": [list(view.lines(f"sweep/values/{key}")) for key in keys],
-            "objectives": _plain(arrays["sweep/objectives"]),
+            "objectives": json_value(arrays["sweep/objectives"]),
             "status": list(view.lines("sweep/status")),
         }
     return state
@@ -127,22 +127,11 @@ def _iterations(view: ResultView) -> dict[str, Any]:
     part = slice(max(0, total - ROWS), total)
     return {
         "first": part.start,
-        "objectives": _plain(np.asarray(columns["objectives"])[part].T),
-        "kkt": _plain(np.asarray(columns["kkt"])[part]) if "kkt" in columns else [],
-        "seconds": _plain(np.asarray(columns["seconds"])[-1:]),
+        "objectives": json_value(np.asarray(columns["objectives"])[part].T),
+        "kkt": json_value(np.asarray(columns["kkt"])[part]) if "kkt" in columns else [],
+        "seconds": json_value(np.asarray(columns["seconds"])[-1:]),
         "evaluations": int(columns["evaluations"][-1]) if total else 0,
     }
-
-
-def _plain(values: Any) -> Any:
-    """Nested lists; null for what is not finite."""
-
-    def cleaned(value: Any) -> Any:
-        if isinstance(value, list):
-            return [cleaned(part) for part in value]
-        return value if math.isfinite(value) else None
-
-    return cleaned(np.asarray(values, dtype=np.float64).tolist())
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -74,10 +74,10 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, workers: Po
     """Try the final design alpha (N,), which `found` evaluated, on the nominal case, every point and a fresh sample."""
     case, sample = engine.case, engine.sample
     places = range(len(sample))
-    parts = engine.all_parts(alpha)
+    at_points = engine.results_at_points(alpha)
     rows = {i: row for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
-    objectives = np.array([[parts[i].peaks[each.name][0].value for each in case.objectives] for i in places])
-    responses = _responses(case, found, [{j: parts[i].limits[j][0].value for j in rows} for i in places])
+    objectives = np.array([[at_points[i].peaks[each.name][0].value for each in case.objectives] for i in places])
+    responses = _responses(case, found, [{j: at_points[i].limits[j][0].value for j in rows} for i in places])
     nominal = engine.points[NOMINAL].evaluate(alpha, gradient=False)
     fresh = check_sample(engine.uncertainty)
     trials = [] if fresh is None else _trials(case, fresh, alpha, workers)

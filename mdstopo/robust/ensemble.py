@@ -28,7 +28,7 @@ NOMINAL = -1
 
 
 @dataclass(frozen=True)
-class Part:
+class PointResult:
     """The results at one point: what competes, by objective and by constraint's place; how it ended; the work done."""
 
     peaks: Mapping[str, tuple[Peak, ...]]
@@ -80,12 +80,12 @@ class Ensemble(Evaluator):
         """
         design = self._design.take(alpha)
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
-        parts = self._parts(wanted, design, gradient, sensitivity)
-        status, message = self._verdict_of(parts)
-        counts = {name: sum(part.work[name] for part in parts.values()) for name in WORK_NAMES}
+        results = self._results(wanted, design, gradient, sensitivity)
+        status, message = self._verdict_of(results)
+        counts = {name: sum(result.work[name] for result in results.values()) for name in WORK_NAMES}
         all_peaks: dict[str, tuple[Peak, ...]] = {}
         if status.usable or status is Status.NO_GRADIENT:
-            all_peaks = self._measured_peaks(parts)
+            all_peaks = self._measured_peaks(results)
         found = self._evaluation(all_peaks, gradient and status.usable, counts, status, message)
         return found._replace(all_compete=True)
 
@@ -156,11 +156,11 @@ class Ensemble(Evaluator):
         """See `Evaluator.pricing_states`; every point is evaluated once more in this process."""
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
         design = self._design.values.copy()
-        parts = {i: self.part(i, design, True, None) for i in wanted}
-        counts = {(i, *place): len(peaks) for i, part in parts.items() for place, peaks in _places(part)}
+        results = {i: self.result_at(i, design, True, None) for i in wanted}
+        counts = {(i, *place): len(peaks) for i, result in results.items() for place, peaks in _places(result)}
         unit = iter(np.eye(sum(counts.values())))
-        # the same parts with one number a peak in the place of its gradient: how a measure is made of them
-        marked = {i: _marked(part, unit) for i, part in parts.items()}
+        # the same results with one number a peak in the place of its gradient: how a measure is made of them
+        marked = {i: _marked(result, unit) for i, result in results.items()}
         all_peaks = self._measured_peaks(marked)
         shares = np.zeros(sum(counts.values()))
         for key, factors in weights.items():
@@ -169,8 +169,8 @@ class Ensemble(Evaluator):
                 shares += factor * peak.gradient
         states = []
         pieces = iter(np.split(shares, np.cumsum(list(counts.values()))[:-1]))
-        for i, part in parts.items():
-            own = {_key(place): next(pieces).tolist() for place, _ in _places(part)}
+        for i, result in results.items():
+            own = {_key(place): next(pieces).tolist() for place, _ in _places(result)}
             states.append(self.points[i].pricing_states(own))
         return type(states[0]).of_all(states)
 
@@ -181,9 +181,9 @@ class Ensemble(Evaluator):
         self.workers = workers
         self._narrower.clear()
 
-    def all_parts(self, alpha: FloatArray) -> dict[int, Part]:
+    def results_at_points(self, alpha: FloatArray) -> dict[int, PointResult]:
         """What every point of the sample gives for a design alpha (N,), without gradients."""
-        return self._parts(range(len(self.sample)), self.design(alpha), False, None)
+        return self._results(range(len(self.sample)), self.design(alpha), False, None)
 
     @property
     def kinds(self) -> list[Case]:
@@ -191,7 +191,7 @@ class Ensemble(Evaluator):
         found = {bool(point.beyond): point.case for point in self.points.values()}
         return [case for beyond, case in found.items() if beyond != bool(self.beyond)]
 
-    def part(self, i: int, design: FloatArray, gradient: bool, sensitivity: str | None) -> Part:
+    def result_at(self, i: int, design: FloatArray, gradient: bool, sensitivity: str | None) -> PointResult:
         """The result at point i; NOMINAL: of the nominal case."""
         point = self.points[i]
         found = point.evaluate(design, gradient, sensitivity)
@@ -200,36 +200,36 @@ class Ensemble(Evaluator):
             shift = point.case.constraints[place].bound - self._bounds_here[place]
             if shift != 0.0:
                 limits[place] = tuple(peak._replace(value=peak.value - shift) for peak in limits[place])
-        return Part(found.peaks, limits, found.status, found.message, found.work)
+        return PointResult(found.peaks, limits, found.status, found.message, found.work)
 
-    def _parts(
+    def _results(
         self, wanted: Sequence[int], design: FloatArray, gradient: bool, sensitivity: str | None
-    ) -> dict[int, Part]:
+    ) -> dict[int, PointResult]:
         if self.workers is None:
-            return {i: self.part(i, design, gradient, sensitivity) for i in wanted}
-        return self.workers.parts(self, wanted, design, gradient, sensitivity)
+            return {i: self.result_at(i, design, gradient, sensitivity) for i in wanted}
+        return self.workers.results(self, wanted, design, gradient, sensitivity)
 
-    def _verdict_of(self, parts: Mapping[int, Part]) -> tuple[Status, str]:
+    def _verdict_of(self, results: Mapping[int, PointResult]) -> tuple[Status, str]:
         """How the points ended as one: as the first that is not usable, else the first whose gradient is one-sided."""
-        wrong = [i for i in sorted(parts) if not parts[i].status.usable]
-        wrong += [i for i in sorted(parts) if not parts[i].status.ok]
+        wrong = [i for i in sorted(results) if not results[i].status.usable]
+        wrong += [i for i in sorted(results) if not results[i].status.ok]
         if not wrong:
-            return Status.OK, next((part.message for part in parts.values() if part.message), "")
-        (i, *_), first = wrong, parts[wrong[0]]
+            return Status.OK, next((result.message for result in results.values() if result.message), "")
+        (i, *_), first = wrong, results[wrong[0]]
         where = "in the nominal case" if i == NOMINAL else name_of(self.case, self.sample, i)
         return first.status, f"{first.message}, {where}" if first.message else where
 
-    def _measured_peaks(self, parts: Mapping[int, Part]) -> dict[str, tuple[Peak, ...]]:
+    def _measured_peaks(self, results: Mapping[int, PointResult]) -> dict[str, tuple[Peak, ...]]:
         """The rows of each measure."""
         all_peaks = {}
         for objective in self.case.objectives:
-            found = {i: part.peaks[objective.name] for i, part in parts.items()}
+            found = {i: result.peaks[objective.name] for i, result in results.items()}
             measure = self.uncertainty.objectives[objective.name]
             all_peaks[objective.name] = self._measured(objective, measure, found, sign_of(objective))
         for place in self._limits:
             row = self.case.constraints[place]
             assert isinstance(row, ResponseRow)
-            found = {i: part.limits[place] for i, part in parts.items()}
+            found = {i: result.limits[place] for i, result in results.items()}
             measure = self.uncertainty.constraints[place]
             sign = -1.0 if row.sense == "at_least" else 1.0
             made = self._measured(row, measure, found, sign)
@@ -255,10 +255,10 @@ class Ensemble(Evaluator):
 Place = tuple[str, int]
 
 
-def _places(part: Part) -> list[tuple[Place, tuple[Peak, ...]]]:
-    """The peaks of a part: of objectives, then of constraints."""
-    objectives = [((name, -1), peaks) for name, peaks in part.peaks.items()]
-    return objectives + [(("", place), peaks) for place, peaks in part.limits.items()]
+def _places(result: PointResult) -> list[tuple[Place, tuple[Peak, ...]]]:
+    """The peaks of a result: of objectives, then of constraints."""
+    objectives = [((name, -1), peaks) for name, peaks in result.peaks.items()]
+    return objectives + [(("", place), peaks) for place, peaks in result.limits.items()]
 
 
 def _key(place: Place) -> str:
@@ -267,12 +267,12 @@ def _key(place: Place) -> str:
     return name or f"constraints[{number}]"
 
 
-def _marked(part: Part, unit: Iterator[FloatArray]) -> Part:
-    """The same part with the next unit vectors in the places of its gradients."""
-    found = [tuple(Peak(peak.time, peak.value, next(unit)) for peak in peaks) for _, peaks in _places(part)]
-    names = len(part.peaks)
+def _marked(result: PointResult, unit: Iterator[FloatArray]) -> PointResult:
+    """The same result with the next unit vectors in the places of its gradients."""
+    found = [tuple(Peak(peak.time, peak.value, next(unit)) for peak in peaks) for _, peaks in _places(result)]
+    names = len(result.peaks)
     return replace(
-        part,
-        peaks=dict(zip(part.peaks, found[:names], strict=True)),
-        limits=dict(zip(part.limits, found[names:], strict=True)),
+        result,
+        peaks=dict(zip(result.peaks, found[:names], strict=True)),
+        limits=dict(zip(result.limits, found[names:], strict=True)),
     )

@@ -1,6 +1,6 @@
 """Points of a sample on several processes: each has its share for good, this one the first.
 
-What a point gives does not depend on where it is computed, and parts are put together by place, so that no result
+What a point gives does not depend on where it is computed, and results are put together by place, so that no result
 depends on the number of processes.
 """
 
@@ -9,11 +9,11 @@ from typing import Any
 
 from mdstopo.case.model import Case
 from mdstopo.evaluation import FloatArray
-from mdstopo.robust.ensemble import Ensemble, Part
+from mdstopo.robust.ensemble import Ensemble, PointResult
 from mdstopo.robust.sample import Sample, design_sample
 from mdstopo.robust.sampled_case import evaluator_at, nominal_case, nominal_evaluator
 from mdstopo.robust.trial import Trial, tried
-from mdstopo.starts.evaluator_interface import even, problem_of
+from mdstopo.starts.evaluator_interface import equal_weights, problem_of
 from mdstopo.starts.getting_ready import get_ready
 from mdstopo.workers.worker_pool import Lost, Parent, Perform, WorkerError, WorkerPool
 
@@ -28,14 +28,14 @@ class PointWorkers:
         self._count = max(1, min(workers, points))
         self._pool = WorkerPool(open_points, case, self._count - 1, sharing=self._count, notify=notify)
 
-    def parts(
+    def results(
         self, ensemble: Ensemble, wanted: Sequence[int], design: FloatArray, gradient: bool, sensitivity: str | None
-    ) -> dict[int, Part]:
+    ) -> dict[int, PointResult]:
         """What the wanted points give, by place. Raises WorkerError where no process can compute a share."""
         names = tuple(objective.name for objective in ensemble.case.objectives)
         shares = [tuple(i for i in wanted if self._owner(i) == k) for k in range(self._count)]
         replies = self._replies([("parts", names, design, gradient, sensitivity, share) for share in shares[1:]])
-        found = {i: ensemble.part(i, design, gradient, sensitivity) for i in shares[0]}
+        found = {i: ensemble.result_at(i, design, gradient, sensitivity) for i in shares[0]}
         for reply in replies:
             found |= reply
         return {i: found[i] for i in wanted}
@@ -76,7 +76,7 @@ def open_points(case: Case) -> Perform:
     nominal = nominal_case(case)
     engine = nominal_evaluator(case)
     # the kernels in the one order in which every process loads them
-    get_ready(nominal, engine, problem_of(engine, even(nominal)), None)
+    get_ready(nominal, engine, problem_of(engine, equal_weights(nominal)), None)
     sample = design_sample(case.uncertainty)
     kept: dict[tuple[int, ...], Ensemble] = {}
 
@@ -89,6 +89,6 @@ def open_points(case: Case) -> Perform:
         if share not in kept:
             kept[share] = Ensemble(case, False, {i: evaluator_at(case, sample, i) for i in share})
         chosen = kept[share].with_objectives(names)
-        return {i: chosen.part(i, design, gradient, sensitivity) for i in share}
+        return {i: chosen.result_at(i, design, gradient, sensitivity) for i in share}
 
     return perform

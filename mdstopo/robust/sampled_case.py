@@ -26,7 +26,7 @@ def nominal_case(case: Case) -> Case:
 
 def case_at(case: Case, sample: Sample, i: int) -> Case:
     """The case at point i. Raises CaseError, at the section's place, where it would be no case, or another problem."""
-    own = settings(_uncertainty(case), sample, i)
+    own = values_by_key(_uncertainty(case), sample, i)
     # those of the point come last, also where one of the same key came earlier
     overrides: dict[str, Any] = {key: value for key, value in case.overrides.items() if key not in own} | own
     try:
@@ -74,7 +74,7 @@ def beyond_of(case: Case) -> str:
     return beyond_springs(case) if case.priced_groups else ""
 
 
-def settings(uncertainty: Uncertainty, sample: Sample, i: int) -> dict[str, Any]:
+def values_by_key(uncertainty: Uncertainty, sample: Sample, i: int) -> dict[str, Any]:
     """Keys of the case and their values at point i: those of its scenario, then those of uncertain numbers."""
     place = int(sample.scenario[i])
     stated: dict[str, Any] = dict(uncertainty.scenarios[place].values) if place >= 0 else {}

@@ -1,4 +1,4 @@
-"""What a careful user would ask of a finished design, asked for them."""
+"""Warnings about a final design: it restrains bodies less than the first one, or no variable has an effect."""
 
 from collections.abc import Mapping
 
@@ -25,10 +25,11 @@ _ROUNDING = 1e-13
 def advise(case: Case, design: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
     """Warnings about the final design, alpha with the values of variables (N + P,).
 
-    before, after: the motion by load case with the starting and the final design. Both warnings are signs of
-    the soft branch: stored energy also falls when members that restrain the bodies are taken away. Where a displacement
-    or an angle is bounded or minimised, that cannot be, and nothing is said; nor where the energy is no objective, or
-    where joints and motions prescribe how the bodies move, as in a driven linkage.
+    before, after: the motion by load case with the starting and the final design. A volume limit that is hardly used,
+    and bodies that move farther than before, are signs that stored energy was lowered by taking away members that
+    restrain the bodies. There are no warnings where that cannot be: where a displacement or an angle is bounded or
+    minimised, where the energy is no objective, or where joints and motions prescribe how the bodies move, as in a
+    driven linkage.
     """
     found = []
     soft = any(may_soften(case, name) and not _prescribed(before[name], after[name]) for name in after)

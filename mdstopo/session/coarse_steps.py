@@ -3,6 +3,7 @@
 import numpy as np
 
 from mdstopo.case.model import Case, FloatArray
+from mdstopo.integrators.steps import TURN
 from mdstopo.store.contents import Motion
 
 #: steps to a period, or for the whole motion, below which it is hardly seen
@@ -17,6 +18,7 @@ def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
 
     A velocity that swings back and forth within fewer than ten steps is not resolved: between two instants at which it
     turns round, half a period, there are fewer than five. Swings below a twentieth of the largest speed do not count.
+    Nor is a body in space followed that turns in a step by more than steps with error control would let it.
     """
     step = case.solver.step
     if step is None or not motion.status.ok or len(motion.t) < 2:
@@ -25,6 +27,8 @@ def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
     if motion.t[-1] - motion.t[0] < FEWEST * step * (1.0 - 1e-9):
         return f"solver.step of {step:g} s: {where}the motion has fewer than ten steps"
     each = motion.v.shape[1] // len(case.bodies)
+    if turning := _turns_too_far(case, motion, each, step):
+        return f"solver.step of {step:g} s: {where}{turning}"
     kinds = np.arange(motion.v.shape[1]) % each < each - each // 2  # places, then turns
     shortest, mover = np.inf, ""
     for column in range(motion.v.shape[1]):
@@ -37,6 +41,24 @@ def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
     return (
         f"solver.step of {step:g} s: {where}the velocity of {mover} swings with a period of some {2.0 * shortest:.2g} "
         "s, fewer than ten steps; halve the step until nothing changes, or leave it out"
+    )
+
+
+def _turns_too_far(case: Case, motion: Motion, each: int, step: float) -> str:
+    """Which body in space turns by more than `TURN` in a step, and what step would do; empty where none does.
+
+    each: freedoms of a body. An angle in a plane says how many whole turns there are, an orientation does not.
+    """
+    if each == 3:
+        return ""
+    rates = np.linalg.norm(motion.v.reshape(len(motion.t), len(case.bodies), each)[:, :, 3:], axis=2).max(axis=0)
+    fastest = int(np.argmax(rates))
+    rate = float(rates[fastest])
+    if not rate * step > 1.1 * TURN:
+        return ""
+    return (
+        f"{case.bodies[fastest].name} turns by {rate * step:.2g} rad in a step, at {rate:.4g} rad/s; {TURN:g} rad is "
+        f"what can be followed: take steps of {TURN / rate:.2g} s or less, or leave it out"
     )
 
 

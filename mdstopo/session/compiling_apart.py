@@ -27,7 +27,7 @@ from mdstopo.plan.pricing import price
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.scene.refusals import refusals
-from mdstopo.starts.evaluator_interface import even, problem_of
+from mdstopo.starts.evaluator_interface import equal_weights, problem_of
 from mdstopo.starts.getting_ready import FEW, get_ready, load_optimizer, motions
 from mdstopo.warm import compilation_due, compiling, needs_general, tiny
 
@@ -119,7 +119,8 @@ def _end(child: subprocess.Popen[bytes]) -> None:
 
 
 def compile_in_background() -> None:
-    """Compile what few variables need: the share of the background process (`warm`) where there are many."""
+    """Compile the optimiser for few variables: the share of the second process (`mdstopo.warm`) where a case has
+    many."""
     load_optimizer(tiny("auto"), FEW)
 
 
@@ -162,7 +163,7 @@ def _compile_back(case: Case) -> None:
     """
     engine = evaluator_of(case, in_background=False)
     load_optimizer(case, FEW)
-    if getattr(problem_of(engine, even(case)), "competes", False):
+    if getattr(problem_of(engine, equal_weights(case)), "competes", False):
         load_optimizer(case, FEW, competes=True)
     engine.compile_responses()
 
@@ -176,11 +177,11 @@ def _compile_all(case: Case) -> None:
     if beyond_springs(case):
         engine.compile_steps()
         motions(case, engine, case.start)  # what the other process compiles last comes last here
-    problem = problem_of(engine, even(case))
+    problem = problem_of(engine, equal_weights(case))
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(case.space.expand(begin), gradient=True)
     if case.priced_groups:
-        price(case, problem_of(engine, even(case)), begin, FEW_CANDIDATES)
+        price(case, problem_of(engine, equal_weights(case)), begin, FEW_CANDIDATES)
     with contextlib.suppress(OSError):  # a full disk
         _marker(case).touch()
 

@@ -1,7 +1,7 @@
 """Whether an integral over time is so near to zero that the tolerance, which is relative to it, makes steps short.
 
-An error is measured relative to the objective. Where a response hardly is anything beside the motion that it is seen
-from, rounding of that motion is more than the error that it may have, and steps are halved until they see it.
+An error is measured relative to the objective. Where a response is very small beside the motion that it is computed
+from, rounding of that motion is larger than the error that the response may have, and steps are made ever shorter.
 """
 
 from mdstopo.case.methods.over_time import REDUCTIONS

@@ -28,7 +28,7 @@ from mdstopo.session.compiling_apart import compile_apart
 from mdstopo.session.near_zero import near_zero
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.saved_states import best_of, best_row, iteration_columns, restore, run_part
-from mdstopo.session.shortfall import of_run
+from mdstopo.session.shortfall import stalled_run
 from mdstopo.session.sizes import Sizes, excess_at_prices
 from mdstopo.session.start_in_stages import (
     ROUND,
@@ -42,7 +42,8 @@ from mdstopo.session.start_in_stages import (
 )
 from mdstopo.session.starts_in_workers import open_starts, run_in_workers
 from mdstopo.starts.callbacks import ignore, never
-from mdstopo.starts.evaluator_interface import Engine, MakeEngine, even, problem_of
+from mdstopo.starts.constraint_columns import relative_violations
+from mdstopo.starts.evaluator_interface import Engine, MakeEngine, equal_weights, problem_of
 from mdstopo.starts.getting_ready import get_ready, motions
 from mdstopo.starts.quotas import carried_over, rounds
 from mdstopo.starts.single_start import NOTHING_VARIES, StartTask, is_moved, make_optimizer, replaced, unshared
@@ -60,6 +61,7 @@ from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.same_case import describe
+from mdstopo.store.set_keys import set_keys
 from mdstopo.store.store_errors import DifferentCaseError, WriteError
 from mdstopo.store.stored_case import built_case
 from mdstopo.store.writing import write_result
@@ -214,7 +216,7 @@ class _Run:
             workers = spread(engine, self.case, workers, self.helpers, self.notify)
         # a run that goes on in a later round begins where it once began, with other members
         started = make(self.stated) if self.rounds.count else engine
-        problem = problem_of(started, even(self.stated))
+        problem = problem_of(started, equal_weights(self.stated))
         stated, begin, self.before = get_ready(self.stated, started, problem, self.initial)
         self.compare(stated, begin)
         compiled = time.perf_counter()
@@ -246,7 +248,7 @@ class _Run:
             status, reason = self.judge(best, status, reason)
             ended_at = self.states[best]
             assert ended_at is not None
-            self.warnings += of_run(self.case, ended_at)
+            self.warnings += stalled_run(self.case, ended_at)
         if path is not None:
             self.save(path, status, reason)
         return self.outcome(engine, path, best, status, reason, ended - opened, compiled - began)
@@ -371,7 +373,7 @@ class _Run:
             "starts": chosen.starts,
             "seed": chosen.seed,
         }
-        self.settings |= {f"set {key}": value for key, value in self.case.overrides.items()}
+        self.settings |= set_keys(self.case)
 
     def compare(self, stated: Floats, nearest: Floats) -> None:
         """A notice where the first design is not the stated one."""
@@ -504,10 +506,7 @@ class _Run:
         assert state is not None
         if state.best_violation <= self.case.optimizer.tolerance or self.constraints is None:
             return status, reason
-        excess = [
-            {"limit": value, "at_least": -value, "equals": abs(value)}[row.sense] / (abs(row.bound) or 1.0)
-            for row, value in zip(self.case.constraints, self.constraints.tolist(), strict=True)
-        ]
+        excess = relative_violations(self.case, self.constraints[None])[0]
         i = int(np.argmax(excess))
         if not (np.isfinite(state.best_violation) and excess[i] > 0.0):  # no design was ever evaluated
             return status, reason

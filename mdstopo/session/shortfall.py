@@ -1,4 +1,5 @@
-"""What is said of a run that ended before its optimality conditions held: how far off, what holds it, what to do."""
+"""Warnings about runs that stalled, before their optimality conditions held: the residual, what holds the design, what
+to try."""
 
 from collections.abc import Sequence
 
@@ -22,7 +23,7 @@ JUMPS = (
 NAMED, SHARE = 3, 1e-2
 
 
-def of_run(case: Case, state: State) -> tuple[str, ...]:
+def stalled_run(case: Case, state: State) -> tuple[str, ...]:
     """The warning about a stalled run whose limits hold; none about others."""
     if state.status is not RunStatus.STALLED or state.best_violation > case.optimizer.tolerance:
         return ()
@@ -34,7 +35,7 @@ def of_run(case: Case, state: State) -> tuple[str, ...]:
     )
 
 
-def of_many(ends: Sequence[tuple[RunStatus, float]], noun: str, tolerance: float | None = None) -> tuple[str, ...]:
+def stalled_runs(ends: Sequence[tuple[RunStatus, float]], noun: str, tolerance: float | None = None) -> tuple[str, ...]:
     """The warning about those of several runs that stalled, by status and residual. noun: what they are, plural."""
     stalled = [kkt for status, kkt in ends if status is RunStatus.STALLED]
     if not stalled:

@@ -227,7 +227,7 @@ class Sizes:
     def part(self) -> Datasets:
         """The datasets that a file keeps of the search, and before its end the best choice as the design."""
         if self._search is None:  # of a run that is opened again: as it was
-            return {} if self._before is None else _kept(self._before)
+            return {} if self._before is None else _catalogue_part(self._before)
         progress = self._search.progress
         part: Datasets = {f"{SEARCH}/{name}": array for name, array in self._search.to_arrays().items()}
         part[f"{SEARCH}/spent"] = np.array(self._spent)
@@ -385,8 +385,8 @@ def _whole(view: ResultView) -> Iterator[None]:
         raise DamagedError(f"{view.path}: damaged: the search for sizes is not whole ({error})") from error
 
 
-def _kept(view: ResultView) -> Datasets:
-    """What a file has of a choice of sizes."""
+def _catalogue_part(view: ResultView) -> Datasets:
+    """The datasets that a file has of a choice of sizes."""
     return {f"{CATALOGUE}/{name}": array for name, array in view.under(CATALOGUE).items()}
 
 

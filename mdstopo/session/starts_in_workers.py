@@ -14,7 +14,7 @@ from mdstopo.case.model import Case
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
 from mdstopo.session.start_in_stages import ROUND, Marked, run_stages
-from mdstopo.starts.evaluator_interface import MakeEngine, even, problem_of
+from mdstopo.starts.evaluator_interface import MakeEngine, equal_weights, problem_of
 from mdstopo.starts.getting_ready import get_ready
 from mdstopo.starts.single_start import StartTask
 from mdstopo.workers.worker_pool import Lost, Parent, Perform, WorkerError, WorkerPool
@@ -30,7 +30,7 @@ def open_starts(job: Job) -> Perform:
     """In a worker: get ready for the starts of a case. A task is a `StartTask` with the state to go on from."""
     case, initial, make_engine, scalarisation = job
     engine = make_engine(case)
-    get_ready(case, engine, problem_of(engine, even(case)), initial)
+    get_ready(case, engine, problem_of(engine, equal_weights(case)), initial)
     problem = problem_of(engine, scalarisation)
     if case.priced_groups:  # several starts are of the first round
         problem = Marked(problem, ROUND, 0)

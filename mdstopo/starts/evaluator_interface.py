@@ -57,7 +57,7 @@ class Engine(Protocol):
 MakeEngine = Callable[[Case], Engine]
 
 
-def even(case: Case) -> Scalarisation | None:
+def equal_weights(case: Case) -> Scalarisation | None:
     """A scalarisation with equal weights of raw values, which needs no utopia, to load kernels with. None for one
     objective."""
     count = len(case.objectives)

@@ -57,7 +57,8 @@ def motions(case: Case, engine: Engine, design: Floats) -> dict[str, Motion]:
 
 
 class _Toy:
-    """A problem of two rows, both of which decide, or of many variables the higher: enough to call every kernel."""
+    """A problem of two rows, large enough to call every kernel of the optimiser. Both rows decide at its optimum; where
+    variables are many only the higher one does."""
 
     def __init__(self, size: int, competes: bool) -> None:
         self.competes = competes

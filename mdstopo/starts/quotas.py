@@ -2,11 +2,11 @@
 The first one, from the stated design, goes on behind all others where it was dropped: several starts end no higher than
 one, unless it came to the same as another one.
 
-Those that begin at the best design do so one after the other: the next one at what the last one has made better. They
-do not where the others have come to so few optima so often that there are hardly more (`all_found`).
+Those that begin at the best design do so one after the other, each at the best that the ones before have found. They
+are left out where the other starts have come to the same few optima so often that hardly any are unfound (`all_found`).
 
-Which go on depends on the states alone, and is written into them (`State.dropped`, `State.twin`): a resumed run, and
-one on any number of processes, decides alike. One that is resumed with another number of starts decides anew
+Which starts go on depends on the states alone, and is written into them (`State.dropped`, `State.twin`): a resumed run,
+and one on any number of processes, decides alike. One that is resumed with another number of starts decides anew
 (`carried_over`).
 """
 
@@ -93,8 +93,11 @@ def all_found(states: Sequence[State | None]) -> bool:
 
 
 def came_to(states: Sequence[State | None]) -> tuple[int, int]:
-    """How many starts had come to an optimum at the first quota, or were still on their way to one, and to how many
-    distinct ones; the same at any later time."""
+    """How many starts are known to lead to an optimum, and to how many distinct ones.
+
+    A start counts that had not been dropped before the first quota, and so does one that was dropped because it came to
+    the same as a start that counts. So the numbers are the same at any later time.
+    """
 
     def is_known(index: int) -> bool:
         state = states[index]
@@ -214,7 +217,8 @@ def _goes_on(state: State | None) -> bool:
 
 
 def _is_taken_up(state: State) -> bool:
-    """Whether a start was dropped, and goes on behind all others: it alone has a twin, itself, and is not dropped."""
+    """Whether a start was dropped and now goes on behind all others. It is marked by a twin, itself, though it is not
+    dropped."""
     return not state.dropped and state.twin >= 0
 
 

@@ -29,8 +29,10 @@ Keep = Callable[[int, State], None]
 Stop = Callable[[], bool]
 
 
-def make_optimizer(case: Case, problem: Problem, family: Family = Family.STATED) -> Optimizer:
-    """The optimiser of the case, with the first steps of a family of starts."""
+def make_optimizer(
+    case: Case, problem: Problem, family: Family = Family.STATED, max_iterations: int | None = None
+) -> Optimizer:
+    """The optimiser of the case, with the first steps of a family of starts. max_iterations: None takes the case's."""
     chosen = case.optimizer
     own = {"trust_start": LONG_FIRST_STEPS} if family is Family.RANDOM else {}
     return make(
@@ -38,7 +40,7 @@ def make_optimizer(case: Case, problem: Problem, family: Family = Family.STATED)
         settings(
             chosen.preset,
             own | dict(chosen.options),
-            max_iterations=chosen.max_iterations,
+            max_iterations=chosen.max_iterations if max_iterations is None else max_iterations,
             tolerance=chosen.tolerance,
             optimizer=chosen.name,
         ),
@@ -124,7 +126,7 @@ def run_start(
             if soft is None:
                 return None
             first, before = soft.best_alpha, soft.evaluations
-        state = counted(optimizer.start(first), before)
+        state = with_evaluations_before(optimizer.start(first), before)
         keep(task.index, state)
     elif not state.dropped:
         state = reopen(optimizer, state)
@@ -158,8 +160,8 @@ def soften(settings: Settings, problem: Problem, first: Floats | None, stop: Sto
     return state
 
 
-def counted(state: State, before: int) -> State:
-    """A first state, to whose evaluations those of another problem are added."""
+def with_evaluations_before(state: State, before: int) -> State:
+    """The first state of a start, changed: to its evaluations those are added that another problem took before."""
     if before:
         state.evaluations += before
         state.history.evaluations[:] = [count + before for count in state.history.evaluations]

@@ -11,6 +11,8 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.case.responses.columns import point_columns, reaction_columns, state_columns
+from mdstopo.store.json_values import json_value
+from mdstopo.store.labels import WITHOUT_POINTS
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.whole_front import whole_front
 
@@ -27,7 +29,7 @@ def tables(view: ResultView, case: Case) -> dict[str, Table]:
     if "pareto/objectives" in view.arrays:
         front = {key: value for key, value in whole_front(view).items() if "/" not in key}
         texts = {key: front.pop(key) for key in ("status", "reason")}
-        front = {key: value for key, value in front.items() if key not in ("alpha", "ends", "ends_alpha")}
+        front = {key: value for key, value in front.items() if key != "alpha" and key not in WITHOUT_POINTS}
         front |= {key: np.array(value) for key, value in texts.items() if value}
         per_name = dict.fromkeys(("weights", "objectives", "utopia", "maxima"), names)
         found["front"] = _columns("point", front, per_name, "weights")
@@ -162,12 +164,6 @@ def as_json(view: ResultView) -> Iterator[str]:
         yield f"{separator}  {json.dumps(path)}: {json.dumps(text)}"
         separator = ",\n"
     for path, array in sorted(view.arrays.items()):
-        yield f"{separator}  {json.dumps(path)}: {json.dumps(_plain(array.tolist()))}"
+        yield f"{separator}  {json.dumps(path)}: {json.dumps(json_value(array))}"
         separator = ",\n"
     yield "\n }\n}\n"
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -42,8 +42,8 @@ _SECOND = {
     "a": "coordinate",
 }
 
-#: in a group of rows, what has no row for each of them, however many rows there are
-_APART = {"ends", "ends_alpha", "ideal", "nadir"}
+#: datasets below `pareto` that have no row for each point, however many rows they have
+WITHOUT_POINTS = ("ends", "ends_alpha", "ideal", "nadir")
 
 
 def labels(case: Case, datasets: Mapping[str, Value]) -> Labels:
@@ -101,7 +101,7 @@ def _rows(case: Case, group: str, scale: str, first: str, datasets: Mapping[str,
         name = path.removeprefix(f"{group}/")
         if path == name or "/" in name or not isinstance(value, np.ndarray) or value.ndim not in (1, 2):
             continue
-        if len(value) == len(leader) and name not in _APART:
+        if len(value) == len(leader) and name not in WITHOUT_POINTS:
             second = (_second(case, group, name, value, found),) if value.ndim == 2 else ()
             found.scales[path] = (f"{group}/{scale}", *second)
 

@@ -11,6 +11,7 @@ from mdstopo.store.contents import Datasets, case_part
 from mdstopo.store.image import Attribute
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
+from mdstopo.store.set_keys import set_keys
 from mdstopo.store.writing import write_result
 
 
@@ -31,7 +32,7 @@ class OutputFile:
         settings: Mapping[str, Attribute],
         warnings: tuple[str, ...] = (),
     ) -> None:
-        """Write the result, the case with it. Raises WriteError if the disk refuses."""
+        """Write the result, with the case and what --set changed of it. Raises WriteError if the disk refuses."""
         write_result(
             self._path,
             self._case,
@@ -40,7 +41,7 @@ class OutputFile:
             reason,
             case_part(self._case) | datasets,
             Provenance.collect(self._command),
-            settings,
+            {**settings, **set_keys(self._case)},
             warnings,
         )
 

@@ -10,6 +10,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.case.scene.candidates import with_members
 from mdstopo.store.contents import CANDIDATES
 from mdstopo.store.result_reader import ResultView
+from mdstopo.store.set_keys import read_set_keys
 from mdstopo.store.store_errors import DamagedError
 
 
@@ -19,9 +20,7 @@ def case_of(view: ResultView, changes: Mapping[str, str] | None = None) -> Case:
     changes: further keys to set, key path -> value in YAML.
     """
     path = Path(view.case_path) if view.case_path else None
-    settings = view.settings.items()
-    overrides = {key.removeprefix("set "): str(value) for key, value in settings if key.startswith("set ")}
-    case = read_case(view.case_text, path=path, overrides=overrides | dict(changes or {}))
+    case = read_case(view.case_text, path=path, overrides=read_set_keys(view.settings) | dict(changes or {}))
     return built_case(view, case) if view.kind in ("run", "pareto") else case
 
 

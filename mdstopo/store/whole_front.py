@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.status import RunStatus
+from mdstopo.store.labels import WITHOUT_POINTS
 from mdstopo.store.result_reader import ResultView
 
 Array = NDArray[Any]
@@ -17,8 +18,6 @@ Array = NDArray[Any]
 FURTHER = "further/"
 #: what stands for a further point in columns that it has none of
 _NOTHING: dict[str, float] = {"evaluations": 0, "dominated": 0}
-#: what has no row for each point
-_APART = ("ends", "ends_alpha", "ideal", "nadir")
 
 
 def whole_front(view: ResultView) -> dict[str, Any]:
@@ -39,7 +38,7 @@ def joined(part: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
         return own
     rows = len(part["weights"])
     for name, column in own.items():
-        if name in ("status", "reason") or name in _APART or len(column) != rows:
+        if name in ("status", "reason") or name in WITHOUT_POINTS or len(column) != rows:
             continue
         more = part.get(FURTHER + name)
         if more is None:

@@ -12,7 +12,7 @@ import pytest
 from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.cli.group import run_group
-from mdstopo.finalize.scaled_laws import sized
+from mdstopo.finalize.scaled_laws import scaled_law
 from mdstopo.robust.sample import design_sample
 from mdstopo.robust.sampled_case import case_at
 from mdstopo.store.same_case import describe, differences
@@ -92,7 +92,7 @@ def test_parameters_are_uncertain() -> None:
 
 def test_a_law_with_a_members_size_in_it() -> None:
     law: Any = read_case(with_law(LAW.replace("}}", "}, free_length: 2}"))).members[0].laws[0]
-    stated = sized(law, 0.25)
+    stated = scaled_law(law, 0.25)
     assert stated == {
         "type": "expression",
         "force": "0.25 * (k*x + c*xd)",
@@ -100,7 +100,7 @@ def test_a_law_with_a_members_size_in_it() -> None:
         "parameters": {"k": 225.0, "c": 6.0},
         "free_length": 2.0,
     }
-    assert sized(law, 1.0)["force"] == "k*x + c*xd"
+    assert scaled_law(law, 1.0)["force"] == "k*x + c*xd"
 
 
 #: what no formula of a law is: names and calls of Python, other languages, and mistakes of grammar

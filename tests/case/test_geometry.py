@@ -162,8 +162,9 @@ def test_filters_include_their_limits_in_spite_of_rounding() -> None:
     assert g.to_index.tolist() == [1, 2]
 
 
-def test_min_length_drops_coinciding_points() -> None:
-    g = group(("[[2, 0], [2, 1]", "[[0, 0], [2, 1]"), ("to: q", "to: q, min_length: 1e-6"))
+@pytest.mark.parametrize("least", ["1e-6", "1e-300"])  # the latter is below the rounding of coordinates
+def test_min_length_drops_coinciding_points(least: str) -> None:
+    g = group(("[[2, 0], [2, 1]", "[[0, 0], [2, 1]"), ("to: q", f"to: q, min_length: {least}"))
     assert len(g) == 5
 
 

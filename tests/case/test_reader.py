@@ -260,3 +260,29 @@ def test_reading_imports_no_scipy() -> None:
         "assert not [m for m in ('scipy', 'numba', 'h5py', 'difflib') if m in sys.modules]"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("solver", "warns"),
+    [
+        ("integrator: auto", True),
+        ("integrator: gauss", True),
+        ("integrator: auto, sensitivity: iterative", False),
+        ("integrator: generalized_alpha", False),
+    ],
+)
+def test_a_spectral_radius_is_ignored_unless_generalized_alpha_makes_the_steps(solver: str, warns: bool) -> None:
+    case = small(("objectives:", f"solver: {{{solver}, spectral_radius: 0.9}}\nobjectives:"))
+    found = [each.path_key for each in case.warnings]
+    assert found == (["solver.spectral_radius"] if warns else [])
+
+
+def test_a_stated_start_may_differ_from_a_prescribed_one_by_rounding_of_what_the_motion_moves_by() -> None:
+    """The prescribed start is 0, so that its own size allows no difference."""
+    motion = "[{body: a, x: {position: {table: [[0, 0], [0.1, 1], [0.15, 2], [0.2, 4]]}}}]"
+    text = changed(SMALL, ("loads:", f"motions: {motion}\nloads:"))
+    near, far = (changed(text, ("position: [0, 0]", f"position: [{x}, 0]")) for x in ("1.0e-9", "1.0e-5"))
+    assert read_case(near).bodies[0].position == (1e-9, 0.0)
+    (mistake,) = mistakes(far)
+    assert mistake.path_key.startswith("motions[0].x.position")
+    assert "they must agree" in mistake.message

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from mdstopo.cli.interrupt import Interrupts
-from mdstopo.cli.output import Output, aligned, duration, plain
+from mdstopo.cli.output import Output, aligned, duration
 from mdstopo.cli.progress import Live, Plain, Silent, display, line
 from mdstopo.cli.show import condensed
 from mdstopo.session.outcome import Progress
+from mdstopo.store.json_values import json_value
 
 
 def progress(iteration: int = 3, **changes: Any) -> Progress:
@@ -43,7 +44,7 @@ def test_quiet_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_numbers_of_every_kind_become_plain() -> None:
-    found = plain({"a": (1, np.float64(2.5)), "b": [np.bool_(True), None], 3: np.zeros((1, 2))})
+    found = json_value({"a": (1, np.float64(2.5)), "b": [np.bool_(True), None], 3: np.zeros((1, 2))})
     assert found == {"a": [1, 2.5], "b": [True, None], "3": [[0.0, 0.0]]}
 
 

@@ -142,6 +142,17 @@ def test_small_swings_and_steps_of_the_solver_are_not_told() -> None:
     assert "fewer than ten steps" in coarse_steps(case, "default", short)
 
 
+@pytest.mark.parametrize(("rate", "told"), [(90.0, False), (628.3, True), (2000.0, True)])
+def test_a_body_in_space_that_turns_too_far_in_a_fixed_step_is_told(rate: float, told: bool) -> None:
+    bodies = "wheel: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 0]}"
+    case = read_case(f"{{format: 1, dimension: 3, time: {{end: 1}}, bodies: {{{bodies}}}, solver: {{step: 0.01}}}}")
+    t = np.arange(0.0, 1.0, 0.01)
+    v = np.tile([0.0, 0.0, 0.0, 0.6 * rate, 0.0, 0.8 * rate], (len(t), 1))
+    found = coarse_steps(case, "default", SimpleNamespace(t=t, v=v, a=np.zeros_like(v), status=Status.OK))
+    assert bool(found) == told
+    assert not told or f"wheel turns by {0.01 * rate:.2g} rad in a step" in found
+
+
 def evaluated(value: float) -> Any:
     return SimpleNamespace(evaluation=SimpleNamespace(status=Status.OK, objectives={"G": value}))
 

@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -18,10 +19,11 @@ from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.document import _versions, content_of, final_content
 from mdstopo.finalize.equilibria import _Distance
-from mdstopo.finalize.finalize_design import finalize, ready
+from mdstopo.finalize.finalize_design import Column, finalize, ready, worse_than_promised
 from mdstopo.finalize.keep import chosen, places, restricted
-from mdstopo.finalize.scaled_laws import sized
+from mdstopo.finalize.scaled_laws import scaled_law
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
+from mdstopo.status import Status
 
 SPRINGS = """\
 format: 1
@@ -125,7 +127,7 @@ def test_a_sized_law_has_its_forces_scaled_and_nothing_else(name: str) -> None:
             given[key] = 3.0
     given |= {"curve": {"curve": np.array([[-1.0, -2.0], [1.0, 4.0]])}}.get(name, {})
     given |= {"table": {"table": Table(np.array([0.0, 1.0]), np.array([[2.0], [4.0]]))}}.get(name, {})
-    found = sized(LAWS[name](**given), 0.25)
+    found = scaled_law(LAWS[name](**given), 0.25)
     assert found.pop("type") == name
     for key, value in found.items():
         if key in ("curve", "table"):
@@ -481,6 +483,21 @@ def test_an_interrupted_run_writes_no_case(tmp_path: Path) -> None:
     done = finalize(case, alpha, kept, reduced, place=tmp_path / "x.yaml", stop_requested=lambda: next(asked, True))
     assert done.outcome.status == "interrupted"
     assert (done.text, done.columns) == ("", ())
+
+
+@pytest.mark.parametrize(("sense", "worse"), [("minimize", "1.2"), ("maximize", "0.8")])
+def test_what_is_worse_than_the_full_design_promised_is_told_by_the_sense_of_the_objective(
+    sense: str, worse: str
+) -> None:
+    case = load_case("in/probe.yaml", {"objectives.G1.sense": sense})
+
+    def column(value: float) -> Column:
+        return Column("", 1, SimpleNamespace(status=Status.OK, objectives={"G1": value, "G2": 1.0}))  # type: ignore[arg-type]
+
+    told = [worse_than_promised(case, (column(1.0), column(value))) for value in (0.8, 1.0, 1.2)]
+    assert [bool(each) for each in told] == [worse == "0.8", False, worse == "1.2"]
+    (sentence,) = next(filter(None, told))
+    assert f"G1 of the final design is 20.0% worse than the full design promised: {worse} in place of 1;" in sentence
 
 
 #: held upright by four stays; a single one is too soft for that

@@ -2,12 +2,14 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mdstopo.cli.group import run_group
 from mdstopo.plots.source import Source
+from mdstopo.report import report_tables
 from mdstopo.report.report_content import content
 from mdstopo.report.report_tables import peak_of
 from tests.browser import BROWSER, look
@@ -132,6 +134,17 @@ def test_tables_are_those_of_the_file(results):
     for k, row in enumerate(design["members"]["rows"]):
         largest = max(np.abs(force[:, k]).max() for force in seen)
         assert abs(forces["belts", row[8]]) >= (1.0 - 1e-3) * largest
+
+
+def test_the_largest_force_of_a_member_may_push_and_is_that_of_all_load_cases(monkeypatch):
+    forces = {"a": [[3.0, 1.0], [-5.0, 2.0]], "b": [[4.0, -2.5], [1.0, 0.0]]}
+    monkeypatch.setattr(report_tables, "forces_of", lambda _case, _design, _kept, q, _v: np.array(forces[q]))
+    motions = {name: (np.array([0.0, 0.1]), SimpleNamespace(q=name, v=None)) for name in forces}
+    found = report_tables.member_peaks(SimpleNamespace(case=None), np.ones(2), [(None, np.arange(2))], motions)
+    assert found == [
+        {"force": -5.0, "time": 0.1, "load_case": "a"},
+        {"force": -2.5, "time": 0.0, "load_case": "b"},
+    ]
 
 
 def test_a_peak_between_samples_is_found():

@@ -29,6 +29,7 @@ JOINED = [
     ["tests/general/test_reductions.py"],
     ["tests/fit/test_statistics.py", "-k", "loss"],
     ["tests/docs/test_generated.py"],
+    ["tests/layers"],
 ]
 
 

@@ -113,13 +113,6 @@ class Plain:
             if group.design
         ))  # fmt: skip
 
-    def energy_rate(self, q: np.ndarray, v: np.ndarray) -> float:
-        return float(sum(
-            law.stiffness * strength @ (delta * rate)
-            for group, law, strength, _, delta, rate in self.groups(q, v)
-            if group.design
-        ))  # fmt: skip
-
     def value(self, signal, t: float, before: bool = False) -> float:
         """A signal of time; right-continuous unless the value just before is asked for."""
         if not isinstance(signal, Table):

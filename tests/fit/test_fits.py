@@ -15,7 +15,7 @@ from mdstopo.fit.fit_problem import FitProblem
 from mdstopo.fit.least_squares import StoppedError, fitted, minimum, starts
 from mdstopo.fit.predictions import Predicted
 from mdstopo.fit.profile_likelihood import profile
-from mdstopo.fit.run_fit import run_fit
+from mdstopo.fit.run_fit import FitRun, Start, run_fit
 from mdstopo.fit.statistics import statistics
 
 from .scenes import DROP, PAIR, measured, problem_of
@@ -180,6 +180,14 @@ def stop_after(count: int) -> Callable[[], bool]:
         return left[0] < 0
 
     return stop
+
+
+def test_only_starts_that_end_as_low_as_the_best_count_as_agreeing(drop: FitProblem) -> None:
+    nothing = np.zeros(len(drop.names))
+    run = FitRun(drop)
+    for level in (3.0, 1.0, 1.0 + 1e-9, 1.1, np.inf):
+        run.starts.append(Start(nothing, nothing, np.zeros(drop.count), level, "converged", "", 1))
+    assert (run.best, run.agreeing) == (1, 2)
 
 
 def test_a_fit_that_is_stopped_goes_on_where_it_was(drop: FitProblem) -> None:

@@ -95,6 +95,17 @@ def test_a_number_that_others_share_by_an_anchor_changes_alone(place: Path) -> N
     assert case.members[0].laws[0].stiffness == 7654.321  # type: ignore[attr-defined]
 
 
+def test_a_law_that_another_group_shares_by_an_anchor_changes_alone(place: Path) -> None:
+    text = TEXT.replace("law: {type", "law: &foam {type").replace(
+        "fit:\n", "  more: {from: {body: ground, at: [0, -2]}, to: feet, law: *foam, design: false}\nfit:\n"
+    )
+    (place / "case.yaml").write_text(text, encoding="utf-8")
+    written = fitted_text(load_case(place / "case.yaml"), NUMBERS, place / "fitted.yaml")
+    (place / "fitted.yaml").write_text(written, encoding="utf-8")
+    check(place / "fitted.yaml")
+    assert load_case(place / "fitted.yaml").members[1].laws[0].stiffness == 8e3  # type: ignore[attr-defined]
+
+
 def test_a_case_that_extends_another_is_written_whole(place: Path) -> None:
     (place / "more.yaml").write_text("format: 1\nextends: case.yaml\ntitle: More\n", encoding="utf-8")
     text = fitted_text(load_case(place / "more.yaml"), NUMBERS, place / "fitted.yaml")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,7 @@ from scipy import optimize, stats
 
 from mdstopo.case.methods.losses import LOSSES
 from mdstopo.case.sections.measurements import Measured
-from mdstopo.fit.least_squares import Minimum
+from mdstopo.fit.least_squares import Minimum, deviation_of
 from mdstopo.fit.loss_functions import for_scipy, loss
 from mdstopo.fit.statistics import statistics
 
@@ -54,6 +55,31 @@ def test_with_known_deviations_residuals_do_not_widen_the_interval() -> None:
     told = statistics(problem, found)
     assert told.deviation[1] == pytest.approx(0.1 / np.sqrt(12 * np.var(x)), rel=1e-10)
     assert told.factor == pytest.approx(stats.norm.ppf(0.975), rel=1e-12)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_estimate_is_held_by_a_bound_only_where_the_cost_falls_beyond_it(side: float) -> None:
+    x = np.linspace(0.0, 3.0, 12)
+    y = 1.0 + 2.0 * x
+    problem, found = line(x, y, 0.1)
+    bounds = problem.upper if side > 0.0 else problem.lower
+    bounds[1] = found.x[1]
+    # the measured values ask for a slope beyond the bound, then for one within it
+    beyond = replace(found, misfit=found.misfit - side * 0.01 * x)
+    assert statistics(problem, beyond).at_bound[1] == side
+    within = replace(found, misfit=found.misfit + side * 0.01 * x)
+    assert statistics(problem, within).at_bound[1] == 0.0
+
+
+@pytest.mark.parametrize("name", ["linear", "huber"])
+def test_an_estimated_deviation_is_that_of_the_errors_though_the_fit_has_followed_some_of_them(name: str) -> None:
+    random = np.random.default_rng(3)
+    n, p = 60, 20
+    slopes = random.normal(size=(n, p))
+    rest = np.eye(n) - slopes @ np.linalg.pinv(slopes)
+    problem: Any = SimpleNamespace(names=range(p), count=n, fit=SimpleNamespace(loss=name))
+    sizes = [deviation_of(problem, rest @ random.normal(size=n), np.ones(n)) for _ in range(1000)]
+    assert np.mean(sizes) == pytest.approx(1.0, abs=0.03)
 
 
 def test_a_column_that_is_another_ones_multiple_leaves_the_third_known() -> None:

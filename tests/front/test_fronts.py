@@ -18,6 +18,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
 from mdstopo.front import cluster
 from mdstopo.front.directions import weights_of_first
+from mdstopo.front.front_content import _dominated
 from mdstopo.front.run_front import Ask, run_front
 from mdstopo.plan.front_measures import dominated, hypervolume, neighbour_gaps, scaled
 from tests.front.support import CASE, THREE
@@ -174,6 +175,13 @@ def test_objectives_of_weight_zero_are_not_simulated_but_reported_at_the_end():
         assert np.isnan(mine.visited[:-1, 1 - i]).all()
         assert np.isfinite(mine.visited[:, i]).all()
         assert np.array_equal(mine.visited[-1], mine.objectives)
+
+
+def test_a_point_that_breaks_a_constraint_beats_none_and_belongs_to_no_front():
+    signed = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])
+    words = ["converged", "converged", "running"]
+    assert _dominated(signed, np.array([0.5, 0.0, 0.0]), words).tolist() == [True, False, False]
+    assert _dominated(signed, np.array([0.0, 0.0, 0.0]), words).tolist() == [False, True, False]
 
 
 def test_three_objectives_make_a_front():

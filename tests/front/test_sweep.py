@@ -10,6 +10,8 @@ import pytest
 import mdstopo
 from mdstopo.cli.group import run_group
 from mdstopo.front.run_sweep import combinations, run_sweep
+from mdstopo.store.result_reader import read_result
+from mdstopo.store.stored_case import case_of
 from tests.session.test_combined_runs import single
 
 
@@ -53,6 +55,12 @@ def test_it_goes_on_where_it_was_and_workers_change_nothing():
     for one, other in zip(second.found, both.found, strict=True):
         assert np.array_equal(one.alpha, other.alpha)
         assert np.array_equal(one.objectives, other.objectives)
+
+
+def test_the_file_has_the_case_with_the_values_that_all_runs_have():
+    sets = {"members.belts.law.stiffness": "3000"}
+    run_sweep(Path("probe.yaml"), {"optimizer.max_iterations": "2"}, sets, path=Path("kept.h5"), workers=1)
+    assert case_of(read_result("kept.h5")).optimizer.max_iterations == 2
 
 
 def test_mistakes_of_all_combinations_are_told_at_once(capsys):

@@ -5,6 +5,7 @@ import pytest
 
 from mdstopo.optimizer.bundle import MOST, Bundle
 from mdstopo.optimizer.bundle_method import PATIENCE
+from mdstopo.optimizer.competing_rows import Trial
 from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import Sample
@@ -143,6 +144,47 @@ def test_penalties_that_were_raised_ever_more_leave_the_residual_as_it_is(penalt
         told.append(tried.kkt)
     assert told[0] < 1.0
     assert told[1] == pytest.approx(told[0], rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3])
+def test_penalties_stay_where_the_model_cannot_lower_what_violations_cost(start):
+    """Two limits that no step keeps together, one ten times as steep: no penalty trades one violation for the other.
+
+    The sum of the violations falls where x does, but what they cost falls where x rises. Penalties rose to 5**8 times
+    what they were for it, and the steps that followed saw nothing of the objective.
+    """
+
+    def limits(x):
+        return np.array([1.0 - x[0], 1.0 + 2.0 * x[0] - 10.0 * x[1]]), np.array([[-1.0, 0.0], [2.0, -10.0]])
+
+    problem = Toy(
+        lambda x: (np.array([x[1]]), np.array([[0.0, 1.0]])), [start, 0.0], [-1.0, 0.0], [1.0, 0.01], constraints=limits
+    )
+    problem.competes = True
+    optimizer = Gsao(problem, settings(max_iterations=200))
+    state = optimizer.start()
+    state.restoring = False
+    method = optimizer._method(state)
+    method.begin(state)
+    before = state.penalty.copy()
+    method.propose(state)
+    assert before.max() > 0.0
+    assert (state.penalty <= 10.0 * before).all()
+
+
+def test_what_is_left_of_a_violation_below_its_penalty_is_rounding():
+    """Rows of constraints carry all of the penalty where these are violated, and less where they are kept."""
+    problem = Toy(
+        lambda x: (np.array([-x[0]]), np.array([[-1.0]])), [0.5], 0.0, 1.0,
+        constraints=lambda x: (np.array([x[0] - 0.2, 0.5 - x[0]]), np.array([[1.0], [-1.0]])),
+    )  # fmt: skip
+    rows = Bundle.of(problem.evaluate(np.array([0.5])), np.arange(1))
+    levels, penalty = np.array([-0.3, 1e-7, 0.2]), np.array([1e3, 4.0])
+    trial = Trial(np.array([0.3]), np.array([1.0, 2.0, 4.0]), np.zeros(0), levels, 0.0, True)
+    assert trial.carried(rows, 2).tolist() == [2.0, 4.0]
+    assert trial.violates(rows, penalty, 1e-9).tolist() == [False, True]
+    assert trial.violates(rows, np.array([2.0, 4.0]), 1e-9).tolist() == [True, True]
+    assert trial.violates(rows, np.array([2.0, 4.0]), 1e-6).tolist() == [False, True]
 
 
 def test_no_word_is_said_that_the_residual_does_not_bear_out():

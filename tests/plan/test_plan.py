@@ -147,6 +147,19 @@ def test_a_point_that_fails_fails_alone():
     assert front.points[2].reason == "it is broken"
 
 
+def test_objectives_that_agree_are_measured_in_their_own_unit():
+    """Both are least at one design: utopia and maxima are one point, and no width to measure in."""
+
+    def agreeing(x):
+        return np.array([x[0] ** 2, 1.0 + 2.0 * x[0] ** 2])
+
+    asked = request(weights_of_first([0.0, 0.5, 1.0]), "weighted_exponential")
+    front, _ = carried_out(asked, solver(agreeing, GRID))
+    assert front.utopia.tolist() == [0.0, 1.0]
+    assert front.maxima.tolist() == [1.0, 2.0]
+    assert [point.alpha[0] for point in front.points] == [0.0, 0.0, 0.0]
+
+
 def test_without_an_end_there_is_no_front():
     weights = weights_of_first([0.0, 1.0])
     front, _ = carried_out(request(weights, "weighted_sum"), solver(convex, GRID, broken=(-2,)))

@@ -52,6 +52,12 @@ def test_a_design_that_restrains_less_and_leaves_material_is_told() -> None:
     assert "only 50.0% of the volume limit" in said(case())
 
 
+def test_bodies_that_move_hardly_farther_than_before_are_not_told() -> None:
+    """A twentieth more is what optima of the same restraint differ by."""
+    told = [advise(case(), np.array([0.9]), motions(0.1), motions(reach)) for reach in (0.104, 0.106)]
+    assert ["against each other" in "".join(each) for each in told] == [False, True]
+
+
 @pytest.mark.parametrize("of", [case(more=LIMIT), case(response=SWAY)], ids=["bounded", "minimised"])
 def test_nothing_is_said_of_a_load_case_in_which_a_displacement_is_held(of: Case) -> None:
     assert "in load case crash" not in said(of)

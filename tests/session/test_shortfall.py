@@ -42,7 +42,7 @@ def stalled(state, **changes):
 
 
 def test_a_stalled_run_is_told_with_its_residual_what_holds_it_and_what_to_try(done) -> None:
-    (told,) = shortfall.of_run(done.case, stalled(done.states[0]))
+    (told,) = shortfall.stalled_run(done.case, stalled(done.states[0]))
     assert "stalled at a KKT residual of 0.0003 where optimizer.tolerance asks for 1e-06" in told
     assert "the objective" in told
     for advice in ("--starts", "solver.tolerance", "optimizer.tolerance"):
@@ -51,9 +51,9 @@ def test_a_stalled_run_is_told_with_its_residual_what_holds_it_and_what_to_try(d
 
 def test_a_stalled_run_that_settles_is_told_where_objectives_jump(done) -> None:
     settles = replace(done.case, solver=replace(done.case.solver, settle=True))
-    (told,) = shortfall.of_run(settles, stalled(done.states[0]))
+    (told,) = shortfall.stalled_run(settles, stalled(done.states[0]))
     assert "comes to rest at another place" in told
-    (told,) = shortfall.of_run(done.case, stalled(done.states[0]))
+    (told,) = shortfall.stalled_run(done.case, stalled(done.states[0]))
     assert "comes to rest at another place" not in told
 
 
@@ -70,23 +70,23 @@ def test_the_constraint_that_carries_a_multiplier_is_named_and_others_are_not(do
 def test_only_a_stalled_run_whose_limits_hold_is_told(done) -> None:
     state = done.states[0]
     for status in (RunStatus.CONVERGED, RunStatus.MAX_ITERATIONS, RunStatus.FAILED):
-        assert shortfall.of_run(done.case, stalled(state, status=status)) == ()
-    assert shortfall.of_run(done.case, stalled(state, best_violation=0.1)) == ()
+        assert shortfall.stalled_run(done.case, stalled(state, status=status)) == ()
+    assert shortfall.stalled_run(done.case, stalled(state, best_violation=0.1)) == ()
 
 
 def test_what_holds_a_run_is_not_known_of_the_separable_model(done) -> None:
-    (told,) = shortfall.of_run(done.case, stalled(done.states[0], uses_bundle=False))
+    (told,) = shortfall.stalled_run(done.case, stalled(done.states[0], uses_bundle=False))
     assert "held by" not in told
 
 
 def test_several_runs_are_told_together_with_the_largest_residual() -> None:
     ends = [(RunStatus.STALLED, 1e-4), (RunStatus.CONVERGED, 1e-7), (RunStatus.STALLED, 2e-3)]
-    (told,) = shortfall.of_many(ends, "points", 1e-6)
+    (told,) = shortfall.stalled_runs(ends, "points", 1e-6)
     assert told.startswith(
         "2 of 3 points stalled at KKT residuals up to 0.002 where optimizer.tolerance asks for 1e-06"
     )
-    assert shortfall.of_many(ends[1:2], "points") == ()
-    (told,) = shortfall.of_many([(RunStatus.STALLED, float("nan"))], "runs")
+    assert shortfall.stalled_runs(ends[1:2], "points") == ()
+    (told,) = shortfall.stalled_runs([(RunStatus.STALLED, float("nan"))], "runs")
     assert told.startswith("1 of 1 runs stalled: try")
 
 

@@ -8,9 +8,15 @@ from typing import Any
 import pytest
 
 from mdstopo.case.model import Case, OptimizerSettings, SolverSettings, SpringLaw
+from mdstopo.case.reader import load_case
+from mdstopo.starts.callbacks import ignore
 from mdstopo.store.admit import admit, admit_resume, prepare_place
+from mdstopo.store.output_file import output_file
+from mdstopo.store.result_reader import read_result
 from mdstopo.store.same_case import describe, differences
+from mdstopo.store.set_keys import without_set_keys
 from mdstopo.store.store_errors import DamagedError, DifferentCaseError, StoreError, UnfinishedError
+from mdstopo.store.stored_case import case_of
 
 MakeResult = Callable[..., Path]
 
@@ -132,3 +138,14 @@ def test_a_key_that_is_gone_counts_as_a_difference(case: Case) -> None:
     )
     assert differences(describe(case), smaller)
     assert not differences(describe(case), case)
+
+
+@pytest.mark.parametrize("kind", ["simulate", "gradient"])
+def test_the_file_of_a_command_has_the_case_with_what_set_has_changed(tmp_path: Path, kind: str) -> None:
+    case = load_case("cases/fig6.yaml", {"time.end": "0.05", "title": "another title"})
+    with output_file(tmp_path / "a.h5", case, kind, overwrite=False, notify=ignore) as file:
+        file.write("converged", "done", {}, {"integrator": "gauss"})
+    view = read_result(tmp_path / "a.h5")
+    again = case_of(view)
+    assert (again.load_cases[0].end, again.title) == (0.05, "another title")
+    assert without_set_keys(view.settings) == {"integrator": "gauss"}

@@ -17,7 +17,7 @@ from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.finalize_design import ready
 from mdstopo.finalize.keep import chosen, kept_values, one_alpha, places, restricted
-from mdstopo.finalize.sized_laws import bound_of
+from mdstopo.finalize.parameter_values import bound_of, with_valid_times
 
 #: a stiffness for all, which costs; springs and energy alone, so that the final case needs no general kernels
 STIFFNESS = """\
@@ -72,6 +72,14 @@ objectives:
 constraints: [{volume: all, limit: 9}, {volume: [star], limit: 5}, {volume: [feet], limit: 2}]
 solver: {tolerance: 1.0e-10}
 optimizer: {max_iterations: 4}
+"""
+
+#: one member with a law
+TIMED = """\
+format: 1
+time: {end: 0.2}
+bodies: {crate: {mass: 60, inertia: 10, position: [0, 0]}}
+members: {strap: {from: {body: crate, at: [0, 0]}, to: {body: ground, at: [1, 0]}, law: LAW}}
 """
 
 
@@ -369,6 +377,14 @@ def test_a_law_whose_end_came_before_its_beginning_never_acts() -> None:
     assert (law["feet_0"].active_from, law["feet_0"].active_until) == (0.01, 0.03)
     assert (law["feet_1"].active_from, law["feet_1"].active_until) == (0.2, None)
     assert same_motion(reduced, own, final, final.start) < 1e-9
+
+
+def test_a_law_that_would_end_when_it_begins_is_written_so_that_it_can_be_read() -> None:
+    case = load_case("parts.yaml")
+    stated = {"type": "spring", "stiffness": 3000.0, "active_from": 0.03, "active_until": 0.03}
+    assert with_valid_times(stated, case) == {"type": "spring", "stiffness": 3000.0, "active_from": 0.2}
+    with pytest.raises(CaseError, match="active_until"):
+        read_case(TIMED.replace("LAW", "{type: spring, stiffness: 3000, active_from: 0.03, active_until: 0.03}"))
 
 
 def test_a_row_used_up_beside_costly_values_stays_so() -> None:

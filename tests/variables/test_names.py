@@ -15,6 +15,7 @@ from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.finalize_design import finalize, opened, ready
 from mdstopo.finalize.lift_case import lifted
+from mdstopo.finalize.names import with_names_fixed
 from mdstopo.robust.ensemble import Ensemble
 from mdstopo.robust.sample import design_sample
 from mdstopo.robust.sampled_case import case_at
@@ -360,3 +361,13 @@ def test_the_case_with_its_points_where_a_design_has_them_is_the_same_case() -> 
     found, expected = mdstopo.evaluate(there, alpha), mdstopo.evaluate(case, alpha, variables=values)
     np.testing.assert_allclose(list(found.objectives.values()), list(expected.objectives.values()), rtol=1e-12)
     np.testing.assert_allclose(found.constraints, expected.constraints, rtol=1e-12)
+
+
+def test_a_name_that_lies_beyond_its_bound_by_rounding_is_fixed_at_the_bound() -> None:
+    case = read_case(FINAL)
+    (named,) = case.defined_variables
+    design = case.start.copy()
+    design[case.space.parts[named.name]] = np.nextafter(named.upper, np.inf)
+    fixed, rest = with_names_fixed(case, design)
+    assert (fixed.variables, len(rest)) == ((), case.n_design)
+    assert fixed.members[1].laws[0].stiffness == named.upper**2 / 50.0  # type: ignore[attr-defined]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
+from mdstopo.case.design.stages import without_stages
 from mdstopo.case.model import Case, MemberGroup
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import inside, number_text, shown
@@ -26,7 +27,7 @@ def with_catalogue(top: Fields, groups: dict[str, MemberGroup], reading: Reading
     found: dict[str, Sizes] = {}
     good = True
     path = inside(design.path, "catalogue") if stated else ""
-    for key, what in _alone(top) if stated else ():
+    for key, what in without_stages(top) if stated else ():
         reading.mistake(path, f"found a catalogue, allowed is none where there {what} ({key})")
         good = False
     for name, entry in (stated or {}).items():
@@ -104,16 +105,6 @@ def _within(sizes: Sequence[float], group: MemberGroup, path: str, reading: Read
             )
             good = False
     return good
-
-
-def _alone(top: Fields) -> list[tuple[str, str]]:
-    """What does not go with a catalogue: key, and what there is."""
-    found = []
-    if isinstance(top["objectives"], dict) and len(top["objectives"]) > 1:
-        found.append(("objectives", "are several objectives"))
-    if top["uncertainty"] is not None:
-        found.append(("uncertainty", "are uncertain values"))
-    return found
 
 
 def has_catalogue(case: Case) -> bool:

@@ -2,8 +2,8 @@
 
 A good design ties two bodies by a few bundles of members. Where such a bundle begins on the one body is kept, where it
 ends on the other is drawn anew: alpha of the member from P to Q becomes that of the member from P to R, where R takes
-Q's place. From such designs the optimiser comes to other optima than from values exchanged at random, which it mostly
-undoes when they are few, and which say nothing of the design when they are many (docs/theory/optimiser.md).
+Q's place. From such designs the optimiser comes to other optima. It seldom does from values that are exchanged at
+random: a few exchanges it mostly undoes, and many leave nothing of the design (docs/theory/optimiser.md).
 """
 
 from collections.abc import Sequence

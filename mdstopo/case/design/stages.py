@@ -54,7 +54,7 @@ def check_powers(design: Fields, top: Fields, reading: Reading) -> bool:
                 reading.mistake(f"{path}[{k}]", words)
                 good = False
         if len(powers) > 1:
-            for key, what in _alone(top):
+            for key, what in without_stages(top):
                 words = f"found a list of {len(powers)} powers, allowed is one power where there {what} ({key})"
                 reading.mistake(path, words)
                 good = False
@@ -72,8 +72,8 @@ def _lists(design: Fields) -> Iterator[tuple[str, list[Any]]]:
                 yield inside(path, name), powers
 
 
-def _alone(top: Fields) -> Iterator[tuple[str, str]]:
-    """What does not go with stages: key, and what there is."""
+def without_stages(top: Fields) -> Iterator[tuple[str, str]]:
+    """What of a case rules out stages, of which the choice of sizes is one: the key, and what stands there in words."""
     if isinstance(top["objectives"], dict) and len(top["objectives"]) > 1:
         yield "objectives", "are several objectives"
     if top["uncertainty"] is not None:

@@ -142,8 +142,8 @@ class VolumeRow(Value):
     """A linear limit on material or cost (Eq. 14): coefficients (N,) . alpha <=, = or >= bound (``limit``,
     ``equals``, ``at_least``).
 
-    A fraction of the total has become its limit. prices (P,): the same of the values of variables, added to it; none
-    where the case has none.
+    A row that the case states as a fraction of the total is a limit here. prices (P,): coefficients of the values of
+    variables, whose costs are added; empty where no variable has a cost.
     """
 
     groups: tuple[str, ...]

@@ -1,16 +1,19 @@
 """The optimiser's variables x and the design that they stand for.
 
 A design is one vector: alpha (N,), then the values of the laws' variables (P,) in their own units. The optimiser sees
-x: one alpha for all members that share it, and each value as its share of the way from its lower to its upper bound, so
-that all variables are numbers of size 1. Both directions are linear:
+x: one alpha for all members that share it, in a unit of its own where its bounds are small numbers (as those of areas
+in square metres are), and each value as its share of the way from its lower to its upper bound, so that all variables
+are numbers of size 1. Both directions are linear:
 
-    alpha_i = x_slot(i),     value_p = (1 - x) lower_p + x upper_p,     dU/dx = T^T dU/d(design)
+    alpha_i = unit_i x_slot(i),     value_p = (1 - x) lower_p + x upper_p,     dU/dx = T^T dU/d(design)
 
-Where nothing is shared and nothing but alpha varies, x is alpha itself: nothing is copied or computed.
+Where nothing is shared, nothing but alpha varies, and no alpha has a unit, x is alpha itself: nothing is copied or
+computed.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -18,17 +21,28 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray, IndexArray
 from mdstopo.case.objects.aims import Variable, VolumeRow
 
+#: the largest bound of alphas that are counted in a unit of their own
+SMALL = 0.25
+
 
 class DesignSpace:
     """The map between the optimiser's variables x (n,) and designs (N + P,).
 
     slots (N,): which x each alpha is, in the order of first appearance; None where each is its own. variables: in the
-    case's order. Immutable.
+    case's order. units (N,): what each alpha is counted in, that of those which are one the same; None: all in 1.
+    Immutable.
     """
 
-    def __init__(self, n_alpha: int, slots: IndexArray | None, variables: Sequence[Variable]) -> None:
+    def __init__(
+        self,
+        n_alpha: int,
+        slots: IndexArray | None,
+        variables: Sequence[Variable],
+        units: FloatArray | None = None,
+    ) -> None:
         self.n_alpha = n_alpha
-        self.identity = slots is None and not variables
+        self.identity = slots is None and not variables and units is None
+        self._units = units
         self._slots = np.arange(n_alpha) if slots is None else slots
         self._own = slots is None
         self._free = n_alpha if slots is None else int(slots.max(initial=-1)) + 1
@@ -55,7 +69,7 @@ class DesignSpace:
         if self.identity:
             return x
         design = np.empty(self.length)
-        design[: self.n_alpha] = x[self._slots]
+        design[: self.n_alpha] = x[self._slots] if self._units is None else x[self._slots] * self._units
         share = x[self._free :]
         design[self.n_alpha :] = (1.0 - share) * self._low + share * self._high
         return design
@@ -65,7 +79,7 @@ class DesignSpace:
         if self.identity:
             return design
         x = np.empty(self.size)
-        x[: self._free] = self._shared(design[: self.n_alpha])
+        x[: self._free] = self._shared(self._counted(design[: self.n_alpha]))
         width = self._high - self._low
         own = design[self.n_alpha :] - self._low
         x[self._free :] = np.divide(own, width, out=np.zeros(len(own)), where=width > 0.0)
@@ -76,6 +90,7 @@ class DesignSpace:
         if self.identity:
             return gradient
         own = gradient[: self.n_alpha]
+        own = own if self._units is None else own * self._units
         summed = own if self._own else np.bincount(self._slots, own, self._free)
         return np.concatenate([summed, gradient[self.n_alpha :] * (self._high - self._low)])
 
@@ -84,8 +99,8 @@ class DesignSpace:
         if self.identity:
             return np.array(lower), np.array(upper)
         low, high = np.full(self._free, -np.inf), np.full(self._free, np.inf)
-        np.maximum.at(low, self._slots, lower)
-        np.minimum.at(high, self._slots, upper)
+        np.maximum.at(low, self._slots, self._counted(lower))
+        np.minimum.at(high, self._slots, self._counted(upper))
         steady = self._high == self._low
         return np.concatenate([low, np.zeros(len(steady))]), np.concatenate([high, np.where(steady, 0.0, 1.0)])
 
@@ -101,6 +116,10 @@ class DesignSpace:
         """The part of each variable, by name, of a design or of a derivative by it (..., N + P)."""
         return {name: design[..., part] for name, part in self.parts.items()}
 
+    def _counted(self, alpha: FloatArray) -> FloatArray:
+        """Alphas (N,) in their units."""
+        return alpha if self._units is None else alpha / self._units
+
     def _shared(self, alpha: FloatArray) -> FloatArray:
         """(free,): the mean of the alphas that share one; that of equal ones is they, to the bit."""
         if self._own:
@@ -110,6 +129,26 @@ class DesignSpace:
         count = np.bincount(self._slots, minlength=self._free)
         mean: FloatArray = first + np.bincount(self._slots, alpha - first[self._slots], self._free) / count
         return mean
+
+
+def units_of(
+    bounds: Sequence[tuple[float, float]], counts: Sequence[int], slots: IndexArray | None
+) -> FloatArray | None:
+    """(N,) what alphas are counted in, from the bounds and the numbers of members of design groups; None where in 1.
+
+    The least power of two that is not below the larger bound: whichever it is, the optimiser sees the same to the bit.
+    1 where that bound is above `SMALL` or 0. Alphas that are one, by slots (N,), take the smallest unit of theirs.
+    """
+    largest = [max(abs(lower), abs(upper)) for lower, upper in bounds]
+    units = [2.0 ** math.ceil(math.log2(size)) if 0.0 < size <= SMALL else 1.0 for size in largest]
+    if all(unit == 1.0 for unit in units):
+        return None
+    found: FloatArray = np.repeat(units, counts)
+    if slots is None:
+        return found
+    least = np.ones(int(slots.max(initial=-1)) + 1)
+    np.minimum.at(least, slots, found)
+    return least[slots]
 
 
 def _values(pieces: list[tuple[float, int]]) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import Any
 from mdstopo.case.arrays import Signal, Table, TimeFormula, VectorSignal
 from mdstopo.case.model import GROUND, AnyBody, Components, Load, LoadCase, Motion
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.scene.load_case_times import DEFAULT, Window
+from mdstopo.case.scene.load_case_times import DEFAULT, TimeSpan
 from mdstopo.case.scene.motions import Start
 from mdstopo.case.scene.prescribed import size_of
 from mdstopo.case.text.reading import BAD, Fields, Reading
@@ -18,7 +18,7 @@ from mdstopo.case.text.words import inside, number_text
 
 def build_load_cases(
     top: Fields,
-    times: dict[str, Window],
+    times: dict[str, TimeSpan],
     motions: dict[str, tuple[Motion, ...]],
     starts: dict[tuple[str, str], Start],
     frames: Frames,
@@ -36,18 +36,18 @@ def build_load_cases(
     common = build_loads(top["loads"], frames, reading)
     cases = top["load_cases"] or {DEFAULT: None}
     built = []
-    for name, window in times.items():
+    for name, span in times.items():
         fields = cases.get(name)
         own = build_loads(fields["loads"], frames, reading) if isinstance(fields, Fields) else ()
         gravity, path = top["gravity"], "gravity"
         if isinstance(fields, Fields) and "gravity" in fields.stated:
             gravity, path = fields["gravity"], inside(fields.path, "gravity")
-        if gravity is BAD or not window.good or fields is BAD:
+        if gravity is BAD or not span.good or fields is BAD:
             continue
         _check_weights(gravity, frames, path, reading)
         moving = [body for body in frames.bodies.values() if body.name != GROUND]
         bodies = tuple(_started(body, starts.get((name, body.name))) for body in moving)
-        built.append(LoadCase(name, gravity, window.start, window.end, common + own, motions.get(name, ()), bodies))
+        built.append(LoadCase(name, gravity, span.start, span.end, common + own, motions.get(name, ()), bodies))
     return tuple(built)
 
 

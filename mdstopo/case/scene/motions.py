@@ -10,7 +10,7 @@ from typing import Any
 
 from mdstopo.case.model import GROUND, Motion
 from mdstopo.case.objects.plane_or_space import Geometry
-from mdstopo.case.scene.load_case_times import Window
+from mdstopo.case.scene.load_case_times import TimeSpan
 from mdstopo.case.scene.prescribed import AGREE, agree, position_at_start, prescribed, rate_at_start, size_of
 from mdstopo.case.scene.prescribed_rotation import prescribed_rotation, turning_rate_at_start
 from mdstopo.case.text.reading import BAD, Fields, Reading
@@ -72,7 +72,7 @@ def build_motions(by_body: dict[str, Fields], geometry: Geometry) -> tuple[Motio
 
 def resolve_starts(
     top: Fields,
-    times: dict[str, Window],
+    times: dict[str, TimeSpan],
     by_case: dict[str, dict[str, Fields]],
     geometry: Geometry,
     reading: Reading,
@@ -83,19 +83,19 @@ def resolve_starts(
     if bodies is BAD:
         return starts
     for case, by_body in by_case.items():
-        window = times.get(case)
-        if window is None or not window.good:
+        span = times.get(case)
+        if span is None or not span.good:
             continue
         for name, motion in by_body.items():
             body = bodies.get(name)
             if isinstance(body, Fields) and body.good():
-                starts[case, name] = _start(motion, body, window, geometry, reading)
+                starts[case, name] = _start(motion, body, span, geometry, reading)
     for name in bodies:
         _one_angle(name, bodies[name], by_case, starts, reading)
     return starts
 
 
-def _start(motion: Fields, body: Fields, window: Window, geometry: Geometry, reading: Reading) -> Start:
+def _start(motion: Fields, body: Fields, span: TimeSpan, geometry: Geometry, reading: Reading) -> Start:
     found: dict[str, Any] = {}
     velocity: list[float | None] = [None] * geometry.number
     for axis, index in geometry.coordinates:
@@ -107,12 +107,12 @@ def _start(motion: Fields, body: Fields, window: Window, geometry: Geometry, rea
             continue
         path = inside(part.path, given.kind)
         if given.kind == "velocity":
-            moves = rate_at_start(given.signal, window, path, reading)
+            moves = rate_at_start(given.signal, span, path, reading)
             if moves is None:
                 continue
             rate, scale = moves
         else:
-            start = position_at_start(given.signal, window, path, reading)
+            start = position_at_start(given.signal, span, path, reading)
             if start is None:
                 continue
             value, rate, per_second = start
@@ -134,7 +134,7 @@ def _start(motion: Fields, body: Fields, window: Window, geometry: Geometry, rea
             velocity[index] = rate
     turn = motion.get("rotation")
     if isinstance(turn, Fields):
-        rates = turning_rate_at_start(turn, body, window, reading)
+        rates = turning_rate_at_start(turn, body, span, reading)
         if rates is not None and "angular_velocity" not in body.stated:
             found["angular_velocity"] = rates
     return Start(velocity=tuple(velocity), **found)

@@ -9,7 +9,7 @@ import numpy as np
 from mdstopo.case.arrays import Signal, Table, TimeFormula
 from mdstopo.case.geometry.spline import value_and_slope
 from mdstopo.case.model import Prescribed
-from mdstopo.case.scene.load_case_times import Window
+from mdstopo.case.scene.load_case_times import TimeSpan
 from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.text.words import number_text
 
@@ -48,41 +48,41 @@ def prescribed(fields: Fields | None) -> Prescribed | None:
     return Prescribed(kind, fields[kind][0])
 
 
-def rate_at_start(signal: Signal, window: Window, path: str, reading: Reading) -> tuple[float, float] | None:
+def rate_at_start(signal: Signal, span: TimeSpan, path: str, reading: Reading) -> tuple[float, float] | None:
     """A prescribed velocity at the start, and its largest size; None where a formula has no value, which is noted at
     `path`."""
-    rate = value_at(signal, window.start)
+    rate = value_at(signal, span.start)
     if not math.isfinite(rate):
-        reading.mistake(path, f"the expression has no value at the start, {number_text(window.start)} s")
+        reading.mistake(path, f"the expression has no value at the start, {number_text(span.start)} s")
         return None
     return rate, size_of(signal)
 
 
-def position_at_start(signal: Signal, window: Window, path: str, reading: Reading) -> tuple[float, float, float] | None:
+def position_at_start(signal: Signal, span: TimeSpan, path: str, reading: Reading) -> tuple[float, float, float] | None:
     """A prescribed position and its rate at the start, and by how much positions change per second.
 
     None where a table does not cover the simulated time, or is too steep, or a formula has no value, which is noted at
     `path`.
     """
     if isinstance(signal, TimeFormula):
-        value, rate = signal.at(window.start), signal.rate_at(window.start)
+        value, rate = signal.at(span.start), signal.rate_at(span.start)
         if not (math.isfinite(value) and math.isfinite(rate)):
-            when = number_text(window.start)
+            when = number_text(span.start)
             reading.mistake(path, f"the expression has no value, or no rate, at the start, {when} s")
             return None
         return value, rate, abs(rate)
     assert isinstance(signal, Table)
     t, x = signal.times, signal.values[:, 0]
-    if not (t[0] <= window.start and window.end <= t[-1]):
+    if not (t[0] <= span.start and span.end <= t[-1]):
         runs = f"{number_text(float(t[0]))} to {number_text(float(t[-1]))} s"
-        needed = f"start {number_text(window.start)} to end {number_text(window.end)} s"
+        needed = f"start {number_text(span.start)} to end {number_text(span.end)} s"
         reading.mistake(path, f"the table runs from {runs}; it must cover {needed}")
         return None
-    value, rate = value_and_slope(t, x, window.start)
+    value, rate = value_and_slope(t, x, span.start)
     if not (math.isfinite(value) and math.isfinite(rate)):
         reading.mistake(path, "the spline through the table is too steep for a number")
         return None
-    return value, rate, float(np.ptp(x) / (window.end - window.start))
+    return value, rate, float(np.ptp(x) / (span.end - span.start))
 
 
 def agree(value: float, stated: float, scale: float, what: str, path: str, reading: Reading) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.geometry.start_rotations import unit
 from mdstopo.case.model import Prescribed, PrescribedRotation
-from mdstopo.case.scene.load_case_times import Window
+from mdstopo.case.scene.load_case_times import TimeSpan
 from mdstopo.case.scene.prescribed import (
     AGREE,
     KINDS,
@@ -41,14 +41,14 @@ def _axis(fields: Fields) -> list[float]:
     return axis
 
 
-def turning_rate_at_start(fields: Fields, body: Fields, window: Window, reading: Reading) -> tuple[float, ...] | None:
+def turning_rate_at_start(fields: Fields, body: Fields, span: TimeSpan, reading: Reading) -> tuple[float, ...] | None:
     """The global angular velocity at the start; notes what does not agree with the body.
 
     None where the keys say nothing that could be used, which has been noted.
 
     fields: keys of the rotation.
     body: keys of the body.
-    window: when the load case runs.
+    span: when the load case runs.
     reading: takes the mistakes.
     """
     if fields["axis"] not in (None, BAD):
@@ -64,7 +64,7 @@ def turning_rate_at_start(fields: Fields, body: Fields, window: Window, reading:
         return None
     stated = np.array(body["angular_velocity"], dtype=np.float64)
     if rotation.angular_velocity:
-        rates = np.array([value_at(signal, window.start) for signal in rotation.angular_velocity])
+        rates = np.array([value_at(signal, span.start) for signal in rotation.angular_velocity])
         scale = max(size_of(signal) for signal in rotation.angular_velocity)
         _compare(rates, scale, body, inside(fields.path, "angular_velocity"), reading)
         return tuple(rates.tolist())
@@ -72,7 +72,7 @@ def turning_rate_at_start(fields: Fields, body: Fields, window: Window, reading:
         (angle,) = rotation.angles
         path = inside(fields.path, angle.kind)
         along = np.array(rotation.axis)
-        start = _angle(angle, float(along @ stated), path, window, reading)
+        start = _angle(angle, float(along @ stated), path, span, reading)
         if start is None:
             return None
         _compare(along * start[0], start[1], body, path, reading)
@@ -80,7 +80,7 @@ def turning_rate_at_start(fields: Fields, body: Fields, window: Window, reading:
     found_rates = []
     for k, (name, angle) in enumerate(zip(ANGLES, rotation.angles, strict=True)):
         path = inside(inside(fields.path, name), angle.kind)
-        start = _angle(angle, float(stated[k]), path, window, reading)
+        start = _angle(angle, float(stated[k]), path, span, reading)
         if start is None:
             return None
         if "angular_velocity" in body.stated:
@@ -89,13 +89,13 @@ def turning_rate_at_start(fields: Fields, body: Fields, window: Window, reading:
     return tuple(found_rates)
 
 
-def _angle(angle: Prescribed, own: float, path: str, window: Window, reading: Reading) -> tuple[float, float] | None:
+def _angle(angle: Prescribed, own: float, path: str, span: TimeSpan, reading: Reading) -> tuple[float, float] | None:
     """Rate of an angle at the start, and its size; None where it cannot start, which is noted. own: the body's rate."""
     if angle.kind == "acceleration":
         return own, abs(own)
     if angle.kind == "velocity":
-        return rate_at_start(angle.signal, window, path, reading)
-    start = position_at_start(angle.signal, window, path, reading)
+        return rate_at_start(angle.signal, span, path, reading)
+    start = position_at_start(angle.signal, span, path, reading)
     if start is None:
         return None
     value, rate, per_second = start

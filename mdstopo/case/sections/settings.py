@@ -9,7 +9,7 @@ from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.methods.integrators import AUTO, INTEGRATORS, having
 from mdstopo.case.methods.sensitivities import chosen
 from mdstopo.case.model import OptimizerSettings, SolverSettings
-from mdstopo.case.scene.load_case_times import Window
+from mdstopo.case.scene.load_case_times import TimeSpan
 from mdstopo.case.text.reading import BAD, Fields, Reading
 from mdstopo.case.text.words import count_text, inside, listed, number_text
 from mdstopo.settings.optimizer_options import OPTIONS
@@ -23,7 +23,7 @@ ROUNDING = 1e-9
 """Share of a length of time that does not count: 0.3 / 3 is as good as 0.1."""
 
 
-def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> SolverSettings:
+def build_solver(fields: Any, times: dict[str, TimeSpan], reading: Reading) -> SolverSettings:
     """The solver's settings; the defaults where they could not be read."""
     if fields is None or fields is BAD:
         return SolverSettings()
@@ -36,7 +36,7 @@ def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> Sol
             f"{sensitivity} does not go with the integrator {integrator}: it needs {listed(having(needed))} (or auto)",
         )
     if step is not None and step is not BAD:
-        _check_step(fields, [window.end - window.start for window in times.values() if window.good], reading)
+        _check_step(fields, [span.end - span.start for span in times.values() if span.good], reading)
     if not fields.good():
         return SolverSettings()
     _warn_ignored(fields, reading)
@@ -61,7 +61,7 @@ def _check_step(fields: Fields, spans: list[float], reading: Reading) -> None:
             path,
             f"found {number_text(step)}: longer than {whose}, which takes {number_text(shortest)} s; allowed is less",
         )
-    elif _is_damped(fields) and shortest < FEWEST_STEPS * step * (1.0 - ROUNDING):
+    elif _has_spectral_radius(fields) and shortest < FEWEST_STEPS * step * (1.0 - ROUNDING):
         count = math.ceil(shortest / step * (1.0 - ROUNDING))
         words = "one step" if count == 1 else f"{count} steps"
         reading.warning(
@@ -77,7 +77,7 @@ def _steps_needed(fields: Fields) -> str:
     return "" if sensitivity is BAD else chosen(sensitivity).steps
 
 
-def _is_damped(fields: Fields) -> bool:
+def _has_spectral_radius(fields: Fields) -> bool:
     """Whether the integrator is one with a spectral radius."""
     integrator: str = fields["integrator"]
     if integrator == AUTO:
@@ -87,7 +87,7 @@ def _is_damped(fields: Fields) -> bool:
 
 def _warn_ignored(fields: Fields, reading: Reading) -> None:
     integrator = fields["integrator"]
-    if "spectral_radius" in fields.stated and not _is_damped(fields):
+    if "spectral_radius" in fields.stated and not _has_spectral_radius(fields):
         message = f"the integrator {integrator} ignores spectral_radius: only generalized_alpha has one"
         reading.warning(inside(fields.path, "spectral_radius"), message)
     if "step" in fields.stated and "tolerance" in fields.stated:

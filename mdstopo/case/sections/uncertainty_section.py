@@ -138,15 +138,15 @@ def _scenarios(fields: Fields, root: Node, numbers: set[str], reading: Reading) 
         for key, value in _items(keys["set"]):
             here = inside(where, key)
             try:
-                settled = _settled(key, root)
+                path_set = _path_set(key, root)
             except WrongPathError as error:
                 reading.mistake(here, error.message)
                 continue
-            below = f"{settled}.", f"{settled}["
-            for both in sorted(each for each in numbers if each == settled or each.startswith(below)):
+            below = f"{path_set}.", f"{path_set}["
+            for both in sorted(each for each in numbers if each == path_set or each.startswith(below)):
                 reading.mistake(here, f"{both} has a distribution; it varies by itself or by scenario, not both")
             _include(steps_of(key)[-1], value, reading)
-            values[settled] = as_yaml(value)
+            values[path_set] = as_yaml(value)
         built.append(Scenario(name, share, FrozenDict(values)))
     return built
 
@@ -163,7 +163,7 @@ def _include(key: str | int, value: Any, reading: Reading) -> None:
             _include("", below, reading)
 
 
-def _settled(key: str, root: Node) -> str:
+def _path_set(key: str, root: Node) -> str:
     """A key path of a scenario as messages write it; what the case does not state may be set all the same."""
     try:
         return _led_to(key, root)[0]

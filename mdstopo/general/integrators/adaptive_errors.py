@@ -41,7 +41,7 @@ def judge_step(tag, run):
     change = 0.9 * (run.rules.tolerance / max(error, 1e-30)) ** (1.0 / run.rules.order)
     if change > 1.0:
         change **= GROWTH
-    turned = largest_turn(step.model, step.q0, run.end_q)
+    turned = largest_turn(step.model, step.q0, run.end_q, h, step.v0, run.end_v)
     run.wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
     if error > run.rules.tolerance or turned > 1.1 * TURN:
         reject(run, s, run.wanted)

@@ -173,7 +173,7 @@ def first_step(
             theta = max(theta, 0.5 * h * h * weight[d] * abs(a[d] - a0[d]))
         if theta <= ENOUGH:
             tau = h / np.sqrt(max(theta, 1e-30))
-            turned = largest_turn(model, q0, q) / h
+            turned = largest_turn(model, q0, q, h, v0, v) / h
             allowed = tau * (tolerance / first_error) ** (1.0 / order)
             return min(allowed, TURN / max(turned, 1e-300))
         h *= max(np.sqrt(AIM / theta), 0.1) if theta < HOPELESS else 0.1

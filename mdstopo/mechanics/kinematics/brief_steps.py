@@ -7,8 +7,8 @@ In a brief step velocities are interpolated by themselves instead, and coordinat
 
 from mdstopo.compiler.jit import part
 
-#: steps shorter than this part of the simulated time are brief: in longer ones rounding leaves some 1e-9 of velocities
-BRIEF = 1e-7
+#: steps shorter than this part of the simulated time are brief: in longer ones rounding leaves some 1e-8 of velocities
+BRIEF = 1e-8
 
 
 @part

@@ -750,8 +750,12 @@ def deflection(model, rel, rel0, p):
     raise NotImplementedError
 
 
-def largest_turn(model, before, after):
-    """How far the bodies of a pair turn against each other between two coordinates (n_q,), rad, at most."""
+def largest_turn(model, before, after, h, v_before, v_after):
+    """How far the bodies of a pair turn against each other between two states, rad, at most.
+
+    model: the compiled scene; before, after (n_q,): coordinates; h: the time between (s); v_before, v_after (n,):
+    velocities.
+    """
     raise NotImplementedError
 
 

@@ -321,8 +321,8 @@ def deflection(model, rel, rel0, p):
 
 
 @part
-def largest_turn(model, before, after):
-    """The largest relative rotation of a pair between two states (rad); see `planar_scales.largest_turn`."""
+def largest_turn(model, before, after, h, v_before, v_after):
+    """The largest relative rotation of a pair, which angles tell; see `kinematics_interface.largest_turn`."""
     return turn_of_pairs(model.pair, before, after)
 
 

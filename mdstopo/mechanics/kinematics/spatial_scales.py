@@ -9,6 +9,9 @@ from mdstopo.mechanics.kinematics.spatial_poses import COORDINATES, FREEDOMS, HO
 from mdstopo.mechanics.kinematics.timed import ARM, BODY, KIND, PUSH, TURNS, most_of_load
 from mdstopo.mechanics.kinematics.vectors import norm, vector_at
 
+#: rad, below half a turn: from this angle on velocities tell how far a body turns in a step
+WHOLE_TURNS = 3.0
+
 
 @part
 def turned_since(q, body):
@@ -50,12 +53,20 @@ def deflection(model, rel, rel0, p):
 
 
 @part
-def largest_turn(model, before, after):
-    """The largest angle by which a body turns between two states, rad: rotation vectors of a step stay short."""
+def largest_turn(model, before, after, h, v_before, v_after):
+    """The largest angle by which a body turns between two states, rad: rotation vectors of a step stay short.
+
+    Quaternions do not tell whole turns, and twenty would look like none: where a body is fast enough for half a turn,
+    its velocities tell; see `kinematics_interface.largest_turn`.
+    """
     largest = 0.0
     for body in range(model.home.shape[0]):
         i = COORDINATES * body + 3
+        j = FREEDOMS * body + 3
         largest = max(largest, norm(turn_between(quaternion_at(before, i), quaternion_at(after, i))))
+        by_rates = 0.5 * h * (norm(vector_at(v_before, j)) + norm(vector_at(v_after, j)))
+        if by_rates > WHOLE_TURNS:
+            largest = max(largest, by_rates)
     return largest
 
 

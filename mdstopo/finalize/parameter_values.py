@@ -1,4 +1,4 @@
-"""The laws of members at the values that a design gives their parameters."""
+"""Parameters of laws that are design variables: the values that a design gives them, and laws with these values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ Given = Mapping[int, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A value of a variable that some member kept has: its place k (None: one for all), before and now, in its unit."""
+    """A value of a variable that a member kept has, before and now, in its unit.
+
+    member: the place of the member in its group; None where all members have one value.
+    """
 
     name: str
     member: int | None
@@ -25,8 +28,11 @@ class Parameter:
     value: float
 
 
-def told_apart(case: Case, places: IndexArray, before: FloatArray, values: FloatArray) -> list[Parameter]:
-    """The values (V,) at these places among all (P,) of the case, before and now."""
+def changed_parameters(case: Case, places: IndexArray, before: FloatArray, values: FloatArray) -> list[Parameter]:
+    """Parameters by their names and members.
+
+    places (V,): of the values among all (P,) of the case. before, values (V,): the values before and now.
+    """
     found: list[Parameter] = []
     rows = list(zip(places.tolist(), before.tolist(), values.tolist(), strict=True))
     first = 0
@@ -63,9 +69,12 @@ def with_values(laws: tuple[Law, ...], values: Given) -> list[Law]:
     return [replace(law, **values.get(place, {})) for place, law in enumerate(laws)]
 
 
-def never_late(stated: dict[str, Any], case: Case) -> dict[str, Any]:
-    """A law as the file states it; one that would end before it begins never acts, and begins after the end of the
-    motion."""
+def with_valid_times(stated: dict[str, Any], case: Case) -> dict[str, Any]:
+    """A law as the file states it, with times that the reader takes.
+
+    A law whose `active_until` is not after its `active_from` never acts; it is stated to begin after the end of the
+    motion.
+    """
     begin, until = stated.get("active_from"), stated.get("active_until")
     if begin is None or until is None or isinstance(begin, str) or isinstance(until, str) or begin < until:
         return stated
@@ -74,7 +83,8 @@ def never_late(stated: dict[str, Any], case: Case) -> dict[str, Any]:
 
 
 def bound_of(row: VolumeRow, n: int, design: FloatArray) -> float:
-    """What a row leaves for alpha (n,) where the values behind it are numbers: its bound without what these cost."""
+    """The bound of a volume row on alpha (n,) alone, where the variables behind alpha have become numbers: the bound
+    less what these cost."""
     if not len(row.prices):
         return row.bound
     left = row.bound - float(row.prices @ design[n:])
