@@ -262,6 +262,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     "robust/test_constraints.py": ("other_kernels_than",),
     "robust/test_gradients.py": ("better[max-", "the_sample[quantile", "the_sample[worst"),
     "robust/test_runs.py": (
+        "several_points_end",
         "no_worker_survives",
         "cannot_be_computed_is_told",
         "imports_nothing_of_this",

@@ -233,7 +233,10 @@ def subproblem(
 def _subproblem_of(
     bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], penalty: Floats, curvature: Curvature
 ) -> Trial:
-    """Solve the model of these rows, as `subproblem` has it."""
+    """Solve the model of the rows of a bundle around x, as `subproblem` has it.
+
+    space: the linear rows; box: the bounds of the next x; penalty: of a violation, by limit; curvature: of the model.
+    """
     lower, upper = box[0] - x, box[1] - x
     free = upper > lower
     d, linear = np.zeros(len(x)), np.zeros(len(space.linear))

@@ -15,7 +15,7 @@ from mdstopo.design_problem import competes, sign_of
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import USUAL, ErrorEstimate, Evaluation, FloatArray, Peak, Rows
 from mdstopo.integrators.steps import WORK_NAMES
-from mdstopo.robust.robust_measures import rows, slopes
+from mdstopo.robust.robust_measures import is_of_peaks, rows, slopes
 from mdstopo.robust.sample import Sample, design_sample
 from mdstopo.robust.sampled_case import evaluator_at, name_of, nominal_evaluator
 from mdstopo.status import Status
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
 #: the nominal case's place among the points
 NOMINAL = -1
+#: numbers in the gradients of all peaks of one objective at all points, at most, where more peaks are asked for
+ROOM = 20_000_000
+#: where there is not room for so many peaks of a point, it is asked for its usual ones
+FEWEST = 8
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,9 @@ class Ensemble(Evaluator):
         measures = [self.uncertainty.objectives[name] for name in self._names]
         measures += [self.uncertainty.constraints[i] for i in self._limits]
         self._nominal_too = any(not measure.is_sampled for measure in measures)
+        self._of_peaks = any(map(is_of_peaks, measures))
+        #: what the last evaluation asked its points for
+        self._told = USUAL
         self._wanted = range(len(self.sample)) if any(measure.is_sampled for measure in measures) else range(0)
         if points is None:
             points = {i: evaluator_at(case, self.sample, i) for i in range(len(self.sample))}
@@ -76,11 +83,13 @@ class Ensemble(Evaluator):
         """The measures of all objectives and constraints at a design alpha (N,), and on demand their gradients.
 
         A point that cannot be computed fails the evaluation; the message names it and its values. Rows of a measure are
-        what the measure makes of the points' usual ones, and no norms: `rows` changes nothing.
+        what it makes of the rows of the points, of which none is a norm: rows by themselves would do where one motion
+        has norms.
         """
         design = self._design.take(alpha)
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
-        results = self._results(wanted, design, gradient, sensitivity)
+        self._told = self._of_each(rows)
+        results = self._results(wanted, design, gradient, sensitivity, self._told)
         status, message = self._verdict_of(results)
         counts = {name: sum(result.work[name] for result in results.values()) for name in WORK_NAMES}
         all_peaks: dict[str, tuple[Peak, ...]] = {}
@@ -88,6 +97,13 @@ class Ensemble(Evaluator):
             all_peaks = self._measured_peaks(results)
         found = self._evaluation(all_peaks, gradient and status.usable, counts, status, message)
         return found._replace(all_compete=True)
+
+    def _of_each(self, rows: Rows) -> Rows:
+        """The rows that each point is asked for: those that its measures can use and memory has room for."""
+        if rows.most is None or not self._of_peaks:
+            return USUAL
+        room = ROOM // (len(self.points) * max(self.case.space.length, 1))
+        return Rows(rows.window, min(rows.most, room)) if room >= FEWEST else USUAL
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
         """What `evaluate` found, and estimates of its errors: those of the points, weighted as the measure does.
@@ -156,7 +172,7 @@ class Ensemble(Evaluator):
         """See `Evaluator.pricing_states`; every point is evaluated once more in this process."""
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
         design = self._design.values.copy()
-        results = {i: self.result_at(i, design, True, None) for i in wanted}
+        results = {i: self.result_at(i, design, True, None, self._told) for i in wanted}
         counts = {(i, *place): len(peaks) for i, result in results.items() for place, peaks in _places(result)}
         unit = iter(np.eye(sum(counts.values())))
         # the same results with one number a peak in the place of its gradient: how a measure is made of them
@@ -183,7 +199,7 @@ class Ensemble(Evaluator):
 
     def results_at_points(self, alpha: FloatArray) -> dict[int, PointResult]:
         """What every point of the sample gives for a design alpha (N,), without gradients."""
-        return self._results(range(len(self.sample)), self.design(alpha), False, None)
+        return self._results(range(len(self.sample)), self.design(alpha), False, None, USUAL)
 
     @property
     def kinds(self) -> list[Case]:
@@ -191,10 +207,13 @@ class Ensemble(Evaluator):
         found = {bool(point.beyond): point.case for point in self.points.values()}
         return [case for beyond, case in found.items() if beyond != bool(self.beyond)]
 
-    def result_at(self, i: int, design: FloatArray, gradient: bool, sensitivity: str | None) -> PointResult:
-        """The result at point i; NOMINAL: of the nominal case."""
+    def result_at(self, i: int, design: FloatArray, gradient: bool, sensitivity: str | None, rows: Rows) -> PointResult:
+        """The result at point i for a design, NOMINAL: of the nominal case, with so many rows.
+
+        gradient, sensitivity: whether there are to be gradients, and by which method; None: the case's.
+        """
         point = self.points[i]
-        found = point.evaluate(design, gradient, sensitivity)
+        found = point.evaluate(design, gradient, sensitivity, rows)
         limits = dict(found.constraint_peaks)
         for place in limits:  # where the bound itself is uncertain, what counts is the distance to it
             shift = point.case.constraints[place].bound - self._bounds_here[place]
@@ -203,11 +222,11 @@ class Ensemble(Evaluator):
         return PointResult(found.peaks, limits, found.status, found.message, found.work)
 
     def _results(
-        self, wanted: Sequence[int], design: FloatArray, gradient: bool, sensitivity: str | None
+        self, wanted: Sequence[int], design: FloatArray, gradient: bool, sensitivity: str | None, rows: Rows
     ) -> dict[int, PointResult]:
         if self.workers is None:
-            return {i: self.result_at(i, design, gradient, sensitivity) for i in wanted}
-        return self.workers.results(self, wanted, design, gradient, sensitivity)
+            return {i: self.result_at(i, design, gradient, sensitivity, rows) for i in wanted}
+        return self.workers.results(self, wanted, design, gradient, sensitivity, rows)
 
     def _verdict_of(self, results: Mapping[int, PointResult]) -> tuple[Status, str]:
         """How the points ended as one: as the first that is not usable, else the first whose gradient is one-sided."""
@@ -244,7 +263,7 @@ class Ensemble(Evaluator):
         own = {i: peaks if competes(of, sign) else peaks[:1] for i, peaks in found.items()}
         if not measure.is_sampled:
             return own[NOMINAL]
-        return rows(measure, [own[i] for i in self._wanted], self.sample.probability, sign)
+        return rows(measure, [own[i] for i in self._wanted], self.sample.probability, sign, self._told)
 
     @property
     def _limits(self) -> list[int]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from mdstopo.case.model import Case
-from mdstopo.evaluation import FloatArray
+from mdstopo.evaluation import FloatArray, Rows
 from mdstopo.robust.ensemble import Ensemble, PointResult
 from mdstopo.robust.sample import Sample, design_sample
 from mdstopo.robust.sampled_case import evaluator_at, nominal_case, nominal_evaluator
@@ -29,13 +29,20 @@ class PointWorkers:
         self._pool = WorkerPool(open_points, case, self._count - 1, sharing=self._count, notify=notify)
 
     def results(
-        self, ensemble: Ensemble, wanted: Sequence[int], design: FloatArray, gradient: bool, sensitivity: str | None
+        self,
+        ensemble: Ensemble,
+        wanted: Sequence[int],
+        design: FloatArray,
+        gradient: bool,
+        sensitivity: str | None,
+        rows: Rows,
     ) -> dict[int, PointResult]:
-        """What the wanted points give, by place. Raises WorkerError where no process can compute a share."""
+        """What the wanted points of an ensemble give for a design, by place; see `Ensemble.result_at` for gradient,
+        sensitivity and rows. Raises WorkerError where no process can compute a share."""
         names = tuple(objective.name for objective in ensemble.case.objectives)
         shares = [tuple(i for i in wanted if self._owner(i) == k) for k in range(self._count)]
-        replies = self._replies([("parts", names, design, gradient, sensitivity, share) for share in shares[1:]])
-        found = {i: ensemble.result_at(i, design, gradient, sensitivity) for i in shares[0]}
+        replies = self._replies([("parts", names, design, gradient, sensitivity, rows, share) for share in shares[1:]])
+        found = {i: ensemble.result_at(i, design, gradient, sensitivity, rows) for i in shares[0]}
         for reply in replies:
             found |= reply
         return {i: found[i] for i in wanted}
@@ -85,10 +92,10 @@ def open_points(case: Case) -> Perform:
         if kind == "trials":
             other, design, places = rest
             return {i: tried(case, other, i, design) for i in places}
-        names, design, gradient, sensitivity, share = rest
+        names, design, gradient, sensitivity, rows, share = rest
         if share not in kept:
             kept[share] = Ensemble(case, False, {i: evaluator_at(case, sample, i) for i in share})
         chosen = kept[share].with_objectives(names)
-        return {i: chosen.result_at(i, design, gradient, sensitivity) for i in share}
+        return {i: chosen.result_at(i, design, gradient, sensitivity, rows) for i in share}
 
     return perform

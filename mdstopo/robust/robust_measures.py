@@ -33,12 +33,14 @@ from numpy.typing import NDArray
 
 from mdstopo.case.methods.measures import MEASURES
 from mdstopo.case.objects.uncertain import Measure
-from mdstopo.evaluation import FloatArray, Peak
+from mdstopo.evaluation import USUAL, FloatArray, Peak, Rows
 from mdstopo.robust.intervals import Estimate, order_statistics, student
 
-#: rows of one measure, at most; of those of a mean, at most
+#: rows of one measure, at most, where no number of peaks was asked for; of those of a mean, at most
 ROWS, MEANS = 16, 8
-#: how far below the highest a row may lie, relative to it, as the engine's competing peaks
+#: rows of one measure, at most, for each peak that was asked for of one point: at several points other peaks compete
+EACH = 4
+#: how far below the highest a row may lie, relative to it, where nothing else was asked for: as the engine's peaks
 WINDOW = 0.15
 #: what rounding leaves of sums of probabilities; of a deviation that is none, relative to the largest value
 _ROUNDING, _NONE = 1e-9, 1e-14
@@ -50,6 +52,9 @@ class Statistic(ABC):
     In all functions, y (S,) are values, worse where larger, with probabilities p (S,) of sum 1.
     """
 
+    #: whether its rows are peaks of single points
+    of_peaks = False
+
     @abstractmethod
     def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
         """The measure of values y (S,) at points with probabilities p."""
@@ -59,7 +64,9 @@ class Statistic(ABC):
         """(S,) the derivatives of the measure by the values y at the points."""
 
     @abstractmethod
-    def rows(self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
+    def rows(
+        self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float, asked: Rows
+    ) -> tuple[Peak, ...]:
         """The rows that stand for the measure in the optimiser; see `rows`."""
 
     @abstractmethod
@@ -78,8 +85,12 @@ class Mean(Statistic):
         """(S,) the derivatives of the measure by the values y at the points; see `Statistic.slopes`."""
         return p.copy()
 
-    def rows(self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
+    def rows(
+        self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float, asked: Rows
+    ) -> tuple[Peak, ...]:
         """The measure with other choices of one peak a point, none above the one with the highest everywhere."""
+        if asked != USUAL:  # because of another measure
+            parts = [_near(part, sign, WINDOW) for part in parts]
         made = [_row(measure, parts, choice, p, sign) for choice in _choices(parts, p, sign)]
         least = sign * made[0].value - WINDOW * abs(made[0].value)
         most = sign * made[0].value
@@ -126,6 +137,8 @@ class MeanAndDeviation(Mean):
 class Quantile(Statistic):
     """The smallest y at or below which at least the share `level` of p lies."""
 
+    of_peaks = True
+
     def value(self, measure: Measure, y: FloatArray, p: FloatArray) -> float:
         """The measure of values y (S,) at points with probabilities p; see `Statistic.value`."""
         return float(y[self.ranked(measure, y, p)[-1]])
@@ -136,13 +149,15 @@ class Quantile(Statistic):
         found[self.ranked(measure, y, p)[-1]] = 1.0
         return found
 
-    def rows(self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
+    def rows(
+        self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float, asked: Rows
+    ) -> tuple[Peak, ...]:
         """The peaks of the points that do not exceed it."""
         y = sign * np.array([part[0].value for part in parts])
         found = [peak for s in np.sort(self.ranked(measure, y, p)).tolist() for peak in parts[s]]
         found.sort(key=lambda peak: -sign * peak.value)
-        least = sign * found[0].value - WINDOW * abs(found[0].value)
-        return tuple(peak for peak in found[:ROWS] if sign * peak.value >= least)
+        most = ROWS if asked.most is None else EACH * asked.most
+        return tuple(_near(found[:most], sign, WINDOW if asked.window is None else asked.window))
 
     def estimate(self, measure: Measure, y: FloatArray) -> Estimate:
         """The quantile with an interval of confidence between two order statistics."""
@@ -178,18 +193,31 @@ def slopes(measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
     return _statistic_of(measure.name).slopes(measure, y, p)
 
 
-def rows(measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
+def rows(
+    measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float, asked: Rows = USUAL
+) -> tuple[Peak, ...]:
     """The rows of a measure, the worst first, which is the measure itself.
 
-    parts: at each point what competes there, worst first. sign: 1 where larger values are worse, else -1. A row's time
-    is NaN where it is of several points.
+    parts: at each point what competes there, worst first. sign: 1 where larger values are worse, else -1. asked: what
+    the points were asked for. A row's time is NaN where it is of several points.
     """
-    return _statistic_of(measure.name).rows(measure, parts, p, sign)
+    return _statistic_of(measure.name).rows(measure, parts, p, sign, asked)
+
+
+def is_of_peaks(measure: Measure) -> bool:
+    """Whether the rows of a measure are peaks of single points, so that it can have more of them."""
+    return not measure.is_sampled or _statistic_of(measure.name).of_peaks
 
 
 def estimate(measure: Measure, y: FloatArray) -> Estimate:
     """Of equally likely independent values y (n,), worse where larger; the worst as a quantile of its level."""
     return _statistic_of(measure.name).estimate(measure, y)
+
+
+def _near(peaks: Sequence[Peak], sign: float, window: float) -> list[Peak]:
+    """Those of the peaks, worst first, that are at most that far from the first, relative to it."""
+    least = sign * peaks[0].value - window * abs(peaks[0].value)
+    return [peak for peak in peaks if sign * peak.value >= least]
 
 
 def _row(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mdstopo.case.objects.uncertain import Measure
-from mdstopo.evaluation import Peak
-from mdstopo.robust.robust_measures import MEANS, ROWS, rows, slopes, statistic
+from mdstopo.evaluation import Peak, Rows
+from mdstopo.robust.robust_measures import EACH, MEANS, ROWS, rows, slopes, statistic
 
 ALL = [Measure("mean"), Measure("mean_deviation", factor=1.5), Measure("worst"), Measure("quantile", level=0.7)]
 
@@ -123,6 +123,26 @@ def test_rows_of_the_worst_case_hold_it_wherever_the_design_goes():
         step = rng.normal(size=3)
         held = max(row.value + row.gradient @ step for row in found)
         assert held == pytest.approx(true_value(Measure("worst"), moved(parts, step), equal(4)))
+
+
+@pytest.mark.parametrize("name", ["worst", "quantile"])
+def test_rows_are_as_many_and_as_far_from_the_highest_as_was_asked_for(name):
+    values = 1.0 - 0.01 * np.arange(90)
+    parts = [tuple(Peak(0.1, float(v), np.ones(2)) for v in values - shift) for shift in (0.0, 0.001)]
+    measure = Measure(name, level=1.0)
+    assert len(rows(measure, parts, equal(2), 1.0)) == ROWS
+    assert len(rows(measure, parts, equal(2), 1.0, Rows(0.6, 6))) == EACH * 6
+    wide = rows(measure, parts, equal(2), 1.0, Rows(0.6, 60))
+    np.testing.assert_allclose(wide[-1].value, 0.4, atol=0.0011)
+    assert len(wide) == 121
+
+
+def test_what_is_asked_for_changes_no_row_of_a_mean():
+    rng = np.random.default_rng(3)
+    parts, far = parts_of(rng, 5), Peak(0.0, 0.6, np.ones(3))
+    found = rows(Measure("mean"), [(*part, far) for part in parts], equal(5), 1.0, Rows(0.6, 60))
+    usual = rows(Measure("mean"), parts, equal(5), 1.0)
+    assert [row.value for row in found] == [row.value for row in usual]
 
 
 @pytest.mark.parametrize("seed", range(4))

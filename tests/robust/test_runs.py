@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 import mdstopo
+from benchmarks.optimum import problems
 from mdstopo.case.objects.uncertain import Measure
 from mdstopo.case.reader import read_case
 from mdstopo.cli import _dispatch
+from mdstopo.evaluation import Rows
 from mdstopo.evaluators import evaluator_of
-from mdstopo.robust import points_in_workers
+from mdstopo.robust import ensemble, points_in_workers
 from mdstopo.robust.conclusion import conclude
 from mdstopo.robust.robust_measures import estimate, statistic
 from mdstopo.robust.sample import lattice
@@ -119,6 +121,31 @@ def test_a_robust_design_is_the_better_one_where_it_counts():
     engine = evaluator_of(robust.case)
     assert robust.status == "converged"
     assert robust.objectives["G"] < engine.evaluate(nominal.alpha, gradient=False).objectives["G"]
+
+
+def wires(**changes):
+    """A block on wires: the largest of their forces is lowered, and the travel of the block is limited."""
+    named = next(problem for problem in problems.all() if problem.name == "wires travel")
+    return read_case(json.dumps({**json.loads(named.text), **changes}))
+
+
+def test_forces_that_compete_at_several_points_end_where_those_of_one_do():
+    section = {"scenarios": {"one": {}, "other": {}}, "objectives": {"f": {"measure": "worst"}}}
+    several, one = mdstopo.optimize(wires(uncertainty=section)), mdstopo.optimize(wires())
+    assert (several.status, one.status) == ("converged", "converged")
+    assert several.objectives["f"] == pytest.approx(one.objectives["f"], rel=1e-5)
+
+
+@pytest.mark.parametrize("room", [20_000_000, 100])
+def test_points_are_asked_for_the_peaks_that_memory_has_room_for(room, monkeypatch):
+    monkeypatch.setattr(ensemble, "ROOM", room)
+    section = {"scenarios": {"one": {}, "other": {}}, "objectives": {"f": {"measure": "worst"}}}
+    case = wires(uncertainty=section)
+    engine = evaluator_of(case)
+    more = engine.evaluate(case.start, True, rows=Rows(0.6, 60)).peaks["f"]
+    usual = engine.evaluate(case.start, True).peaks["f"]
+    assert more[0].value == usual[0].value
+    assert (len(more) > len(usual)) == (room > 100)
 
 
 @pytest.fixture(scope="module")
