@@ -18,6 +18,18 @@ combine: {weights: {E: 1, M: 1, X: 1, B: 1, A: 1}, normalize: false}
 constraints:
   - {response: {angle: {body: m}}, over_time: max_abs, limit: 3}
 """
+#: two bodies with points that members may join, for 0.3 s
+FRAME_AND_LOAD = """\
+format: 1
+time: {end: 0.3}
+bodies:
+  frame: {mass: 20, inertia: 4, position: [0, 0]}
+  load: {mass: 5, inertia: 0.5, position: [0, 1], velocity: [1.5, 0], angular_velocity: 1}
+points:
+  left: {body: frame, grid: {line: {from: [-1, 0], to: [-1, 1], count: 3}}}
+  right: {body: frame, grid: {line: {from: [1, 0], to: [1, 1], count: 3}}}
+  belt: {body: load, grid: {list: [[-0.2, 1], [0.2, 1]]}}
+"""
 
 
 def case_of(text, **solver):

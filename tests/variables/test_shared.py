@@ -8,18 +8,11 @@ from mdstopo.case.reader import read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.session.run_session import run_session
-from tests.variables.support import whole_and_resumed
+from tests.variables.support import FRAME_AND_LOAD, whole_and_resumed
 
-SCENE = """
-format: 1
-time: {end: 0.3}
-bodies:
-  frame: {mass: 20, inertia: 4, position: [0, 0]}
-  load: {mass: 5, inertia: 0.5, position: [0, 1], velocity: [1.5, 0], angular_velocity: 1}
-points:
-  left: {body: frame, grid: {line: {from: [-1, 0], to: [-1, 1], count: 3}}}
-  right: {body: frame, grid: {line: {from: [1, 0], to: [1, 1], count: 3}}}
-  belt: {body: load, grid: {list: [[-0.2, 1], [0.2, 1]]}}
+SCENE = (
+    FRAME_AND_LOAD
+    + """\
 members:
   lefts: {from: left, to: belt, law: {type: spring, stiffness: 2000}}
   rights: {from: right, to: belt, law: {type: spring, stiffness: 2000}}
@@ -31,6 +24,7 @@ constraints:
 design: {initial: 0.2, lower: {lefts: 0.01, rights: 0.02, more: 0.001}, SHARING}
 optimizer: {max_iterations: 8}
 """
+)
 
 
 def case_with(sharing: str, **overrides: str) -> mdstopo.Case:

@@ -1,6 +1,6 @@
 """Alphas that are small numbers, as areas in square metres are, beside others that are not: the same problem in shares.
 
-A power of two in the place of the area makes both the same to the bit; the least share of a unit is another.
+Where the area is a power of two, both runs are the same to the bit.
 """
 
 import numpy as np
@@ -11,17 +11,11 @@ from mdstopo.case.objects.design_space import DesignSpace, units_of
 from mdstopo.case.reader import read_case
 from mdstopo.session.run_session import run_session
 from mdstopo.status import RunStatus
+from tests.variables.support import FRAME_AND_LOAD
 
-SCENE = """
-format: 1
-time: {end: 0.3}
-bodies:
-  frame: {mass: 20, inertia: 4, position: [0, 0]}
-  load: {mass: 5, inertia: 0.5, position: [0, 1], velocity: [1.5, 0], angular_velocity: 1}
-points:
-  left: {body: frame, grid: {line: {from: [-1, 0], to: [-1, 1], count: 3}}}
-  right: {body: frame, grid: {line: {from: [1, 0], to: [1, 1], count: 3}}}
-  belt: {body: load, grid: {list: [[-0.2, 1], [0.2, 1]]}}
+SCENE = (
+    FRAME_AND_LOAD
+    + """\
 members:
   bars: {from: left, to: belt, law: {type: spring, stiffness: BARS}}
   ropes: {from: right, to: belt, law: {type: spring, stiffness: 2000, damping: 20}}
@@ -37,6 +31,7 @@ design:
   MORE
 optimizer: {max_iterations: 60}
 """
+)
 
 
 def case_in(area: float, more: str = "") -> mdstopo.Case:
