@@ -4,11 +4,14 @@ A mass m is held by a spring alpha k along x, weighs m p there and begins with t
 x = p / w^2 (1 - cos w t) + u / w sin w t, w^2 = alpha k / m. Its largest value, its smallest and its end differ.
 """
 
+import json
+
 import numpy as np
 import pytest
 import yaml
 from scipy.integrate import simpson
 
+import mdstopo
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
@@ -85,3 +88,34 @@ def test_values_alone_leave_the_gradients_as_they_are(engine, evaluation):
     assert engine.evaluate(np.array([ALPHA]), gradient=False).objectives == evaluation.objectives
     assert np.array_equal(kept, before)
     assert np.any(before != 0.0)
+
+
+def test_the_lowest_velocity_at_the_moment_of_a_landing_keeps_its_sign():
+    # 2 kg fall 0.4 m from rest on a floor with a damper, under a spring of 1 N/m: v^2 = 2 g h - alpha h^2 k / m
+    document = {
+        "format": 1,
+        "gravity": [0, -9.81],
+        "time": {"end": 0.6},
+        "bodies": {"b": {"mass": 2, "inertia": 0.1, "position": [0, 0.5]}},
+        "points": {"feet": {"body": "b", "grid": {"list": [[0, 0.4]]}}},
+        "members": {
+            "s": {
+                "from": {"body": "b", "at": [0, 0.5]},
+                "to": {"body": "ground", "at": [0, 2]},
+                "law": {"type": "spring", "stiffness": 1},
+            }
+        },
+        "contacts": [
+            {
+                "points": "feet",
+                "on": {"body": "ground", "from": [-1, 0], "to": [1, 0]},
+                "stiffness": 1e3,
+                "damping": 200,
+            }
+        ],
+        "objectives": {"v": {"response": {"velocity": {"body": "b", "component": "y"}}, "over_time": "min"}},
+    }
+    found = mdstopo.evaluate(read_case(json.dumps(document)))
+    speed = (2.0 * 9.81 * 0.4 - 0.1 * 0.4**2 / 2.0) ** 0.5
+    assert found.objectives["v"] == pytest.approx(-speed, rel=1e-7)
+    assert found.gradients["v"] == pytest.approx([0.4**2 / 2.0 / (2.0 * speed)], rel=1e-5)

@@ -42,7 +42,7 @@ def minima(driver: DriverWithRun, j: int, t: FloatArray) -> FloatArray:
         if c <= 0.0 or c >= 1.0:
             if 0 < between < len(pieces):
                 _at_boundary(row, pieces, between, highest, pieces.is_stated(between))
-        elif bent and row[VALUE] <= LOW * highest:
+        elif bent and abs(row[VALUE]) <= LOW * highest:
             _turned_round(row, pieces, k)
     return rows
 
@@ -58,7 +58,7 @@ def _at_boundary(row: FloatArray, pieces: Pieces, b: int, highest: float, stated
     if not falls <= 0.0 <= rises or falls == rises:
         return
     if first == second:
-        if falls < 0.0 < rises and row[VALUE] <= LANDED * highest:
+        if falls < 0.0 < rises and abs(row[VALUE]) <= LANDED * highest:
             row[VALUE], row[OTHER] = 0.0, ZERO
     elif not stated:
         row[WHO], row[OTHER], row[SHARE] = first, second, -falls / (rises - falls)
