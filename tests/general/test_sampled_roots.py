@@ -5,7 +5,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
-from mdstopo.general.responses.sampled_roots import roots_on_grid
+from mdstopo.general.responses.sampled_roots import roots_between, roots_on_grid
 from mdstopo.general.scene.timed_loads import PARTS, kink_times
 
 
@@ -69,3 +69,9 @@ def test_a_mean_of_what_a_fast_switch_lets_through_is_that_of_one_found_along_th
         case = read_case(FAST.replace("FORCE", "100*sin(314*t)").replace("RESPONSE", response))
         along[name] = mdstopo.evaluate(case, gradient=False).objectives["G"]
     assert along["time"] == pytest.approx(along["motion"], rel=1e-7)
+
+
+@pytest.mark.filterwarnings("error")
+def test_rates_whose_squares_are_below_the_smallest_number_tell_of_no_root() -> None:
+    ends, rates = (1.0, 1.0), (-1e-180, 2e-180)
+    assert list(roots_between((0.0, 1.0), ends, rates, lambda c: np.ones(len(c)))) == []

@@ -51,7 +51,10 @@ def roots_between(
         return
     # it comes nearer to zero and goes away again: the cubic says where, and whether it may pass zero there
     square, cube = 3.0 * (d1 - d0) - 2.0 * s0 - s1, s0 + s1 - 2.0 * (d1 - d0)
-    c = -s0 / (square + np.copysign(np.sqrt(max(square * square - 3.0 * cube * s0, 0.0)), d0))
+    bend = square + np.copysign(np.sqrt(max(square * square - 3.0 * cube * s0, 0.0)), d0)
+    if bend == 0.0:  # numbers whose squares are below the smallest there is
+        return
+    c = -s0 / bend
     dip = d0 + c * (s0 + c * (square + c * cube))
     if not 0.0 < c < 1.0 or dip * d0 > (0.02 * min(abs(d0), abs(d1)) + 1e-4 * max(abs(s0), abs(s1))) * abs(d0):
         return
