@@ -129,6 +129,7 @@ THOROUGH: dict[str, tuple[str, ...]] = {
     ),
     "general/test_across.py": ("peaks_time[alpha",),
     "general/test_against_springs.py": ("short_steps_give",),
+    "general/test_brief_steps.py": ("[esdirk", "[generalized_alpha"),
     "general/test_bushing_damping.py": ("differences[generalized_alpha",),
     "general/test_candidate_prices.py": ("",),
     "general/test_contact.py": (
