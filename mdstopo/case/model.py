@@ -242,8 +242,8 @@ class Case(Value):
         slots = slots_of(counts, self.shared, self.mirrored)
         # prices of candidates that are not built are by alpha, and sizes of a catalogue are alphas
         in_alpha = any(group.candidates is not None or group.sizes for group in self.design_groups)
-        bounds = [] if in_alpha else [(group.lower, group.upper) for group in self.design_groups]
-        units = units_of(bounds, list(counts.values()), slots)
+        bounds = [(group.lower, group.upper) for group in self.design_groups]
+        units = None if in_alpha else units_of(bounds, list(counts.values()), slots)
         return DesignSpace(self.n_design, slots, self.variables, units)
 
     @property

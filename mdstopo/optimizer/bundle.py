@@ -164,11 +164,17 @@ class Bundle:
         least = np.zeros(int(self.group.max(initial=0)) + 1)
         least[0] = (values - reach)[self.group == 0].max(initial=-np.inf)
         kept = values + reach >= least[self.group]
-        straight = self.norm & (reach <= STRAIGHT * np.hypot(self.vector[:, 0], self.vector[:, 1]))
-        vector = np.where(straight[:, None], np.stack([values, np.zeros(len(self))], axis=1), self.vector)
-        slope = np.where(straight[:, None], self.slopes_at(np.zeros(len(width))), self.slope)
-        offset = np.where(straight, np.nan, self.offset)
-        return kept, self._with(vector=vector, slope=slope, offset=offset).subset(kept)
+        straight = reach <= STRAIGHT * np.hypot(self.vector[:, 0], self.vector[:, 1])
+        return kept, self.with_tangents(self.norm & straight).subset(kept)
+
+    def with_tangents(self, norms: Bools) -> "Bundle":
+        """The rows, those of them that the mask (K,) tells as lines: their tangents at the iterate."""
+        lines = norms | ~self.norm
+        first = np.where(norms, self.values(), self.vector[:, 0])
+        vector = np.stack([first, np.where(norms, 0.0, self.vector[:, 1])], axis=1)
+        slope = np.where(norms[:, None], self.slopes_at(np.zeros(self.slope.shape[1])), self.slope)
+        across = self.across[:, :0] if lines.all() else self.across
+        return self._with(vector=vector, slope=slope, across=across, offset=np.where(norms, np.nan, self.offset))
 
     def subset(self, places: Ints | Bools) -> "Bundle":
         """A bundle of some of the rows."""

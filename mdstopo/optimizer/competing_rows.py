@@ -216,8 +216,8 @@ def subproblem(
       curvature: B, the matrix of the quadratic term.
 
     Fixed variables and linear rows without a free one are left out; the trial keeps box and linear rows to rounding.
-    In a very small box levels that are far apart, and vectors far longer than they change, take the digits away. What
-    cannot be solved for it is solved with the rows alone that matter in the box.
+    In a very small box, rounding of levels that are far apart, or of vectors that hardly change, is more than the rows
+    change. Where the subproblem cannot be solved for that reason, only the rows that matter in the box are kept.
     """
     trial = _subproblem_of(bundle, x, space, box, penalty, curvature)
     if trial.solved:
@@ -390,10 +390,7 @@ def multipliers(
     """
     if steepest == 0.0:
         return 0.0, np.eye(1, len(own))[0], np.zeros(len(space.linear.A))
-    lines = Bundle(
-        np.stack([own.values(), np.zeros(len(own))], axis=1), own.slopes_at(np.zeros(len(x))), np.zeros((len(own), 0)),
-        np.full(len(own), np.nan), own.group, own.own, own.age, own.distance,
-    )  # fmt: skip
+    lines = own.with_tangents(own.norm)
     found = _multipliers_of(lines, x, space, penalty, steepest)
     near = _gaps(lines) <= NEAR * steepest * space.scale
     if near.all() or not (near & (lines.group == 0)).any():
@@ -412,7 +409,7 @@ def _multipliers_of(
     """The multipliers of the proximal step of these lines, and the residual with them, as `multipliers` has them."""
     flat, whole = Curvature.diagonal_of(np.full(len(x), steepest / space.scale)), (space.lower, space.upper)
     trial = subproblem(lines, x, space, whole, penalty, flat)
-    if not trial.solved:  # of violations that are rounding penalties rise without end
+    if not trial.solved:  # as where limits contradict each other, and penalties have risen by many powers of ten
         trial = subproblem(lines, x, space, whole, np.minimum(penalty, HIGHEST * steepest), flat)
     found = residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
     return found, trial.multipliers, trial.linear

@@ -68,7 +68,7 @@ class Ensemble(Evaluator):
         self._nominal_too = any(not measure.is_sampled for measure in measures)
         self._of_peaks = any(map(is_of_peaks, measures))
         #: what the last evaluation asked its points for
-        self._told = USUAL
+        self._asked = USUAL
         self._wanted = range(len(self.sample)) if any(measure.is_sampled for measure in measures) else range(0)
         if points is None:
             points = {i: evaluator_at(case, self.sample, i) for i in range(len(self.sample))}
@@ -88,8 +88,8 @@ class Ensemble(Evaluator):
         """
         design = self._design.take(alpha)
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
-        self._told = self._of_each(rows)
-        results = self._results(wanted, design, gradient, sensitivity, self._told)
+        self._asked = self._of_each(rows)
+        results = self._results(wanted, design, gradient, sensitivity, self._asked)
         status, message = self._verdict_of(results)
         counts = {name: sum(result.work[name] for result in results.values()) for name in WORK_NAMES}
         all_peaks: dict[str, tuple[Peak, ...]] = {}
@@ -172,7 +172,7 @@ class Ensemble(Evaluator):
         """See `Evaluator.pricing_states`; every point is evaluated once more in this process."""
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
         design = self._design.values.copy()
-        results = {i: self.result_at(i, design, True, None, self._told) for i in wanted}
+        results = {i: self.result_at(i, design, True, None, self._asked) for i in wanted}
         counts = {(i, *place): len(peaks) for i, result in results.items() for place, peaks in _places(result)}
         unit = iter(np.eye(sum(counts.values())))
         # the same results with one number a peak in the place of its gradient: how a measure is made of them
@@ -263,7 +263,7 @@ class Ensemble(Evaluator):
         own = {i: peaks if competes(of, sign) else peaks[:1] for i, peaks in found.items()}
         if not measure.is_sampled:
             return own[NOMINAL]
-        return rows(measure, [own[i] for i in self._wanted], self.sample.probability, sign, self._told)
+        return rows(measure, [own[i] for i in self._wanted], self.sample.probability, sign, self._asked)
 
     @property
     def _limits(self) -> list[int]:

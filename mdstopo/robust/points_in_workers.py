@@ -41,7 +41,8 @@ class PointWorkers:
         sensitivity and rows. Raises WorkerError where no process can compute a share."""
         names = tuple(objective.name for objective in ensemble.case.objectives)
         shares = [tuple(i for i in wanted if self._owner(i) == k) for k in range(self._count)]
-        replies = self._replies([("parts", names, design, gradient, sensitivity, rows, share) for share in shares[1:]])
+        task = ("results", names, design, gradient, sensitivity, rows)
+        replies = self._replies([(*task, share) for share in shares[1:]])
         found = {i: ensemble.result_at(i, design, gradient, sensitivity, rows) for i in shares[0]}
         for reply in replies:
             found |= reply

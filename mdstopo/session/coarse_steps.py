@@ -18,7 +18,7 @@ def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
 
     A velocity that swings back and forth within fewer than ten steps is not resolved: between two instants at which it
     turns round, half a period, there are fewer than five. Swings below a twentieth of the largest speed do not count.
-    Nor is a body in space followed that turns in a step by more than steps with error control would let it.
+    Neither is it where a body in space turns in a step by more than error control would allow.
     """
     step = case.solver.step
     if step is None or not motion.status.ok or len(motion.t) < 2:
