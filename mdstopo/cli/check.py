@@ -1,5 +1,6 @@
 """`mdstopo check`: what is in a case."""
 
+import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,11 +65,16 @@ def _read(output: Output, case_path: Path, overrides: dict[str, str]) -> "Case":
 def _say_stated(output: Output, case: "Case", case_path: Path) -> dict[str, Any]:
     """What the file states, without computing any motion: warnings, parts, totals, material."""
     from mdstopo.cli.check_numbers import material, totals
-    from mdstopo.cli.check_scene import left_behind, odd_scales
+    from mdstopo.cli.check_scene import left_behind, odd_scales, unlike_partners
 
     for remark in case.warnings:
         output.notice(f"warning: {remark.located(str(case_path))}")
-    for question in (*odd_scales(case), *left_behind(case)):
+    questions = {
+        "odd_scales": odd_scales(case),
+        "left_behind": left_behind(case),
+        "unlike_partners": unlike_partners(case),
+    }
+    for question in itertools.chain(*questions.values()):
         output.notice(f"warning: {question}")
     output.say(f"{case.title or case.name} ({case_path})")
     _say_bodies(output, case)
@@ -102,6 +108,7 @@ def _say_stated(output: Output, case: "Case", case_path: Path) -> dict[str, Any]
         **({"fit": [each.key for each in case.fit.numbers]} if case.fit is not None else {}),
         "totals": {name: {"value": value, "unit": unit} for name, value, unit in sums},
         "objectives": [objective.name for objective in case.objectives],
+        **questions,
     }
 
 
@@ -182,7 +189,7 @@ def _mistaken(case_path: Path, error: "CaseError") -> dict[str, Any]:
 
 def _say_doubts(output: Output, case: "Case", engine: "Evaluator") -> dict[str, Any]:
     """What nothing holds, what has no stiffness, and steps that are too long."""
-    from mdstopo.cli.check_scene import in_words, left_behind, long_step, odd_scales, restraint
+    from mdstopo.cli.check_scene import in_words, long_step, restraint
 
     held, steps = {}, []
     for name, scene in engine.scenes.items():
@@ -193,7 +200,7 @@ def _say_doubts(output: Output, case: "Case", engine: "Evaluator") -> dict[str, 
         if too_long := long_step(case, modes, scene.bodies):
             steps.append(too_long)
             output.notice(f"warning: load case {name}: {too_long}")
-    return {"restraint": held, "long_steps": steps, "odd_scales": odd_scales(case), "left_behind": left_behind(case)}
+    return {"restraint": held, "long_steps": steps}
 
 
 def _say_bodies(output: Output, case: "Case") -> None:
@@ -323,8 +330,9 @@ def _say_fit(output: Output, case: "Case") -> None:
 
 
 def _frequency_rows(entry: dict[str, Any]) -> list[list[str]]:
-    """The table of the natural frequencies of one load case."""
-    rows = [["design", "omega, rad/s", "omega t1"]]
+    """The table of the natural frequencies of one load case, with modes of negative stiffness where there are some."""
+    grow = any(entry["growing"].values())
+    rows = [["design", "omega, rad/s", "omega t1", *(["growing, 1/s"] if grow else [])]]
     for design in ("initial", "lower"):
         values = entry[design]
         rows.append(
@@ -334,6 +342,8 @@ def _frequency_rows(entry: dict[str, Any]) -> list[list[str]]:
                 ", ".join(number(value * entry["duration"], 4) for value in values) or "-",
             ]
         )
+        if grow:
+            rows[-1].append(", ".join(number(rate, 4) for rate in entry["growing"][design]) or "none")
     return rows
 
 

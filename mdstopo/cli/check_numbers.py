@@ -18,10 +18,29 @@ Floats = NDArray[np.float64]
 _RIGID = 1e-6  # share of the highest frequency below which a mode counts as free motion
 
 
-class Vibrates(Protocol):
-    """What has natural frequencies at the start, in rad/s."""
+class Modes(Protocol):
+    """What is used of `scene.vibration_modes.Modes`, for types."""
 
-    def natural_frequencies(self, alpha: Floats, load_case: str) -> Floats: ...
+    @property
+    def squares(self) -> Floats: ...
+    @property
+    def shapes(self) -> Floats: ...
+    @property
+    def least(self) -> float: ...
+    @property
+    def frequencies(self) -> Floats: ...
+
+
+class Vibrates(Protocol):
+    """What has modes of small motion about the start."""
+
+    def start_modes(self, alpha: Floats, load_case: str) -> Modes: ...
+
+
+def growing_rates(modes: Modes) -> Floats:
+    """The rates in 1/s of the modes of negative stiffness, the fastest first."""
+    rates: Floats = np.sqrt(-modes.squares[modes.squares < -modes.least])
+    return rates
 
 
 def totals(case: Case) -> list[tuple[str, float, str]]:
@@ -96,7 +115,8 @@ def _bounds(case: Case) -> tuple[Floats, Floats]:
 
 
 def frequencies(case: Case, engine: Vibrates) -> list[dict[str, Any]]:
-    """For each load case the natural frequencies of the initial design and of the lower bounds, in rad/s.
+    """For each load case the natural frequencies of the initial design and of the lower bounds, in rad/s, and the rates
+    of modes that grow for want of stiffness, in 1/s.
 
     `criterion` is omega(initial) omega(lower bounds) t1^2 of the lowest elastic mode, None where there is
     none: only above 4 is stored energy lowest on the stiff branch.
@@ -104,9 +124,9 @@ def frequencies(case: Case, engine: Vibrates) -> list[dict[str, Any]]:
     found = []
     for load_case in case.load_cases:
         duration = load_case.end - load_case.start
-        initial, lower = (
-            _elastic(engine.natural_frequencies(alpha, load_case.name)) for alpha in (case.start, _bounds(case)[0])
-        )
+        modes = [engine.start_modes(alpha, load_case.name) for alpha in (case.start, _bounds(case)[0])]
+        initial, lower = (_elastic(each.frequencies) for each in modes)
+        growing = (growing_rates(each).tolist() for each in modes)
         both = min(len(initial), len(lower)) > 0
         found.append(
             {
@@ -114,6 +134,7 @@ def frequencies(case: Case, engine: Vibrates) -> list[dict[str, Any]]:
                 "duration": duration,
                 "initial": initial.tolist(),
                 "lower": lower.tolist(),
+                "growing": dict(zip(("initial", "lower"), growing, strict=True)),
                 "criterion": float(initial[0] * lower[0] * duration**2) if both else None,
             }
         )

@@ -1,13 +1,13 @@
 """What in a scene is worth a second look before anything runs: what nothing holds, odd scales, steps too long."""
 
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, LoadCase
-from mdstopo.cli.check_numbers import depths
+from mdstopo.cli.check_numbers import Modes, depths, growing_rates
 from mdstopo.cli.output import number
 
 Floats = NDArray[np.float64]
@@ -19,19 +19,10 @@ HEAVY = 1000.0
 #: how near a point has to be to touch, and how far a body moves while another stands that should travel with it, in
 #: the size of the larger of both
 TOUCHING, FAR = 0.02, 5.0
+#: relative difference up to which two members are as long as each other
+ALIKE = 1e-6
 #: steps that a period has at least, to be seen at all
 FEWEST = 10.0
-
-
-class Modes(Protocol):
-    """What is used of `scene.vibration_modes.Modes`, for types."""
-
-    @property
-    def squares(self) -> Floats: ...
-    @property
-    def shapes(self) -> Floats: ...
-    @property
-    def least(self) -> float: ...
 
 
 def odd_scales(case: Case) -> list[str]:
@@ -81,6 +72,30 @@ def left_behind(case: Case) -> list[str]:
                 f"body {stands} stands at the start of load case {load_case.name}, {moves}, which it touches (contact "
                 f"{contact.name}), moves at {number(max(speeds), 3)} m/s: has it a velocity, too?"
             )
+    return found
+
+
+def unlike_partners(case: Case) -> list[str]:
+    """Mirrored groups whose members have the same lengths, but not member by member; a question each.
+
+    Partners of a symmetric design are as long as each other; points that are listed in another order on one side pair
+    members that are no images.
+    """
+    found = []
+    for names in case.mirrored:
+        first, *others = (group for group in case.members if group.name in names)
+        for other in others:
+            apart = np.abs(first.length - other.length)
+            unlike = np.flatnonzero(apart > ALIKE * first.length.max(initial=0.0))
+            alike = np.allclose(np.sort(first.length), np.sort(other.length), rtol=ALIKE, atol=0.0)
+            if alike and len(unlike):
+                k = int(unlike[0])
+                found.append(
+                    f"{len(unlike)} of {len(apart)} mirrored members of {first.name} and {other.name} differ in length "
+                    f"from their partners, as number {k + 1} does ({number(first.length[k], 4)} and "
+                    f"{number(other.length[k], 4)} m), though both groups have the same lengths: are the points of one "
+                    f"in another order?"
+                )
     return found
 
 
@@ -137,15 +152,14 @@ def restraint(case: Case, load_case: LoadCase, modes: Modes, bodies: tuple[str, 
     """
     free = unrestrained(case, load_case)
     none = np.flatnonzero(np.abs(modes.squares) <= modes.least)
-    growing = np.flatnonzero(modes.squares < -modes.least)
     movers = [] if free else sorted({_mover(case, modes.shapes[:, k], bodies) for k in none})
     return {
         "free": [list(names) for names in free],
         "loose": max(len(none) - len(free) * (3 if case.dimension == 2 else 6), 0),
         "movers": movers,
         "growing": [
-            {"rate": float(np.sqrt(-modes.squares[k])), "mover": _mover(case, modes.shapes[:, k], bodies)}
-            for k in growing
+            {"rate": float(rate), "mover": _mover(case, modes.shapes[:, k], bodies)}
+            for k, rate in enumerate(growing_rates(modes))
         ],
     }
 

@@ -22,6 +22,7 @@ from mdstopo.cli.gradient_numbers import (
 )
 from mdstopo.cli.output import Output
 from mdstopo.evaluation import Peak
+from mdstopo.scene.vibration_modes import Modes
 from mdstopo.status import Status
 
 Floats = NDArray[np.float64]
@@ -66,25 +67,39 @@ def test_material_rows_show_what_the_bounds_allow() -> None:
     assert material(read_case(CASE)) == [["m", "at most", "1", "0.2", "0.002", "2"]]
 
 
-class Modes:
-    def natural_frequencies(self, alpha: Floats, load_case: str) -> Floats:
-        return np.array([0.0, 1e-9, 30.0, 5.0]) * np.sqrt(alpha[0] / 0.1)
+class Vibrating:
+    """Small motion with these squares of angular frequencies at alpha = 0.1, which alpha raises in proportion."""
+
+    def __init__(self, squares: list[float], held: float = 0.0) -> None:
+        self.squares, self.held = np.array(squares), held
+
+    def start_modes(self, alpha: Floats, load_case: str) -> Modes:
+        squares = self.squares * alpha[0] / 0.1 - self.held
+        return Modes(np.diag(squares), np.eye(len(squares)), scale=0.0)
 
 
 def test_the_criterion_takes_the_lowest_elastic_mode() -> None:
-    (entry,) = frequencies(read_case(CASE), Modes())
+    (entry,) = frequencies(read_case(CASE), Vibrating([0.0, 1e-18, 900.0, 25.0]))
     assert entry["initial"] == [5.0, 30.0]
     assert entry["criterion"] == pytest.approx(5.0 * 5.0 * np.sqrt(0.001 / 0.1) * 4.0)
+    assert entry["growing"] == {"initial": [], "lower": []}
 
 
 def test_cases_without_elastic_modes_have_no_criterion() -> None:
-    class Free:
-        def natural_frequencies(self, alpha: Floats, load_case: str) -> Floats:
-            return np.zeros(6)
-
-    (entry,) = frequencies(read_case(CASE), Free())
+    (entry,) = frequencies(read_case(CASE), Vibrating([0.0] * 6))
     assert entry["initial"] == []
     assert entry["criterion"] is None
+
+
+def test_modes_that_grow_at_the_lower_bounds_stand_in_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    case = read_case(CASE)
+    (entry,) = frequencies(case, Vibrating([9e6, 25.0], held=9.0))
+    assert entry["growing"]["initial"] == []
+    assert entry["growing"]["lower"] == pytest.approx([np.sqrt(9.0 - 0.25)])
+    _say_frequencies(Output(), case, [entry])
+    told = capsys.readouterr().out.splitlines()
+    assert told[1].split()[-2:] == ["growing,", "1/s"]
+    assert [line.split()[-1] for line in told[2:4]] == ["none", "2.958"]
 
 
 def smooth(alpha: Floats) -> dict[str, float]:
@@ -162,7 +177,9 @@ class Listener:
 
 def test_load_cases_with_the_same_frequencies_and_duration_are_said_once() -> None:
     def entry(name: str, duration: float, initial: float) -> dict[str, Any]:
-        return {"load_case": name, "duration": duration, "initial": [initial], "lower": [1.0], "criterion": None}
+        still: dict[str, list[float]] = {"initial": [], "lower": []}
+        both = {"initial": [initial], "lower": [1.0], "growing": still}
+        return {"load_case": name, "duration": duration, "criterion": None, **both}
 
     heard = Listener()
     found = [entry("front", 1.0, 2.0), entry("side", 1.0, 2.0), entry("stiff", 1.0, 3.0), entry("long", 2.0, 2.0)]

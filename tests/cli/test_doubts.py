@@ -11,7 +11,15 @@ import pytest
 
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.cli.check_cost import in_words as cost_in_words
-from mdstopo.cli.check_scene import in_words, left_behind, long_step, odd_scales, restraint, unrestrained
+from mdstopo.cli.check_scene import (
+    in_words,
+    left_behind,
+    long_step,
+    odd_scales,
+    restraint,
+    unlike_partners,
+    unrestrained,
+)
 from mdstopo.cli.front_display import line
 from mdstopo.cli.group import run_group
 from mdstopo.cli.progress import Rate
@@ -101,6 +109,40 @@ def test_a_body_that_stands_on_one_that_drives_away_is_asked_about(
         assert "body driver stands" in sentence
         assert "contact seat" in sentence
         assert "20 m/s" in sentence
+
+
+MIRRORED = """\
+format: 1
+time: {end: 1}
+bodies:
+  mast: {mass: 10, inertia: 1, position: [0, 1]}
+points:
+  right: {body: mast, grid: {list: [[0.1, 0.4], [0.1, 0.9], [0.1, 1.7]]}}
+  left: {body: mast, grid: {list: LEFT}}
+  east: {body: ground, grid: {list: [[1, 0], [1, 0], [1, 0]]}}
+  west: {body: ground, grid: {list: [[-1, 0], [-1, 0], [-1, 0]]}}
+members:
+  a: {from: right, to: east, connect: pairs, law: {type: spring, stiffness: 10}}
+  b: {from: left, to: west, connect: pairs, law: {type: spring, stiffness: 10}}
+design: {mirrored: [[a, b]]}
+objectives:
+  G: {response: energy}
+"""
+
+
+@pytest.mark.parametrize(
+    ("left", "asked"),
+    [
+        ("[[-0.1, 0.4], [-0.1, 0.9], [-0.1, 1.7]]", ""),
+        ("[[-0.1, 1.7], [-0.1, 0.9], [-0.1, 0.4]]", "2 of 3 mirrored members of a and b differ in length"),
+        # a side that is not the image of the other in any order is meant so
+        ("[[-0.1, 1.7], [-0.1, 0.9], [-0.1, 0.5]]", ""),
+    ],
+)
+def test_mirrored_members_whose_points_are_in_another_order_are_asked_about(left: str, asked: str) -> None:
+    told = unlike_partners(read_case(MIRRORED.replace("LEFT", left)))
+    assert len(told) == bool(asked)
+    assert all(asked in sentence and "as number 1 does (0.9849 and 1.924 m)" in sentence for sentence in told)
 
 
 def test_bodies_that_nothing_holds_are_named_together() -> None:
