@@ -23,7 +23,7 @@ from mdstopo.optimizer.competing_rows import (
 from mdstopo.optimizer.gsao_state import GsaoState
 from mdstopo.optimizer.nearest_feasible import project
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
-from mdstopo.optimizer.safeguards import is_least, nothing_is_left, residual_unit
+from mdstopo.optimizer.safeguards import is_least, nothing_is_left, nothing_is_promised, residual_unit
 from mdstopo.optimizer.violations import merit, plain_violation, scaled_violation
 from mdstopo.settings.optimizer_presets import Settings
 
@@ -54,6 +54,9 @@ LONG, NARROW = 0.5, 0.1
 FARTHEST, LEAST_LEFT, MOST_LEFT = 5.0, 0.1, 0.6
 #: share of the objective below which a promised decrease is none
 NO_DECREASE = 1e-13
+#: of a smooth objective: the shares of the promised decrease between which a step gains what was promised, how many
+#: such steps in a row show that the curvature is known, and how many times a promise is gained where it was not
+TRUE, TRUE_STEPS, WRONG = (0.5, 2.0), 3, 10.0
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
 #: for a null step, both in shares of those levels
 DECISIVE, NOT_ABOVE = 1e-12, 1e-9
@@ -122,11 +125,11 @@ class BundleMethod:
             state.penalty = self.first_penalty(rows)
         state.concavity = _carried_over(state.concavity, len(state.penalty) + 1)
         state.stagnation, state.violation_mark = 0, float("inf")
-        state.kkt = float("nan")
+        state.kkt, state.true_steps = float("nan"), 0
 
     def _restore(self, state: GsaoState) -> None:
         """Make the largest violation the objective."""
-        state.restoring, state.resets = True, 0
+        state.restoring, state.resets, state.promised = True, 0, float("inf")
         state.trust = max(state.trust, RESET_TRUST)
         self._begin(state)
 
@@ -201,7 +204,10 @@ class BundleMethod:
         goes_on = smooth and ratio > settings.number("poor_ratio")
         state.small = state.small + 1 if small and not goes_on else 0
         accepted = ratio >= settings.number("accept_ratio")
+        state.true_steps = state.true_steps + 1 if smooth and TRUE[0] <= ratio <= TRUE[1] else 0
         if accepted:
+            if actual > WRONG * state.promised:
+                state.promised = float("inf")
             promised = moved.subset(state.bundle.own).levels(groups)
             self._count_stagnation(state, *(float(levels[1:].max(initial=0.0)) for levels in (here, promised, there)))
             state.bundle = moved.without_peaks_of(new).joined(new)
@@ -245,6 +251,8 @@ class BundleMethod:
             trial = self._steer(state, rows, around.flat(FLOOR * steepest), here)
         promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty)
         state.predicted = merit(here[0], here[1:], state.penalty) - promised
+        if state.true_steps >= TRUE_STEPS and self.model.lengths(trial.x - state.alpha)[0] <= LONG * state.trust:
+            state.promised = min(state.promised, state.predicted)
         state.trial = trial.x
         state.multipliers = trial.multipliers
         enough = CARRIED * np.concatenate([[1.0], state.penalty])
@@ -308,9 +316,11 @@ class BundleMethod:
         return True
 
     def _is_confirmed(self, state: GsaoState) -> bool:
-        """Whether rows that were found after others had been dropped leave nothing to be gained."""
-        return state.violation <= self.settings.tolerance and nothing_is_left(
-            state, self.most_to_gain(state), self.settings.tolerance
+        """Whether rows that were found after others had been dropped leave nothing to be gained, or a curvature that is
+        known does."""
+        tolerance = self.settings.tolerance
+        return state.violation <= tolerance and (
+            nothing_is_promised(state, tolerance) or nothing_is_left(state, self.most_to_gain(state), tolerance)
         )
 
     def _trust_after_step(self, trust: float, size: float, ratio: float) -> float:

@@ -190,6 +190,8 @@ class Gsao:
             concavity=np.zeros(1),
             stagnation=0,
             violation_mark=float("inf"),
+            true_steps=0,
+            promised=float("inf"),
         )
 
     def _judge(self, state: GsaoState, sample: Sample) -> bool:

@@ -70,7 +70,9 @@ class GsaoState(State):
     rows, `steps` and `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation
     stands for the objective, `far_design_tried` whether a design far from a least violation was tried, `resets` how
     often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups (`Bundle.lowered`), `stagnation`
-    how many iterates the largest violation has not fallen well below `violation_mark`.
+    how many iterates the largest violation has not fallen well below `violation_mark`. Of a smooth objective:
+    `true_steps` how many accepted steps in a row have gained what the model promised, and `promised`, the decrease that
+    it promises at the iterate after such steps; infinite where that is not known.
     """
 
     optimizer: ClassVar[str] = "gsao"
@@ -106,6 +108,8 @@ class GsaoState(State):
     concavity: Floats
     stagnation: int
     violation_mark: float
+    true_steps: int
+    promised: float
 
     @property
     def sample(self) -> Sample:
@@ -181,9 +185,9 @@ class GsaoState(State):
             return slopes_of(np.array(arrays[name]))
         if name == "shift":
             return Shifts(np.array(arrays[name]))
-        if name == "far_design_tried" and name not in arrays:  # of older files
-            return False
-        if name == "cuts_lowered" and name not in arrays:  # of older files
+        if name in _ADDED and name not in arrays:
+            return _ADDED[name]
+        if name == "cuts_lowered" and name not in arrays:
             return np.zeros(len(arrays["cuts"]))
         if name == "step":
             array = np.array(arrays[name])
@@ -191,5 +195,7 @@ class GsaoState(State):
         return State._from_arrays(name, arrays)
 
 
+#: what fields are that older files do not have
+_ADDED: dict[str, Any] = {"far_design_tried": False, "true_steps": 0, "promised": float("inf")}
 #: fields that are arrays by name themselves
 _PARTS: dict[str, type[Bundle] | type[RowDetails]] = {"bundle": Bundle, "row_details": RowDetails}

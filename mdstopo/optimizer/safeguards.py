@@ -43,6 +43,11 @@ FRESH = 1e-5
 GRADIENT_SHARE = 1e-5
 # What a residual may be at most, in shares of the violation that it says cannot be made smaller.
 RESIDUAL_SHARE = 0.1
+# What a curvature that foretells steps truly may promise at most where a run has converged, in tolerances: from the
+# promises of 1e-5 to 1e-9 of one run on, 6 to 40 times as much was gained until its end.
+PROMISED_SHARE = 1e-2
+# The largest share of the objective that may be left to be gained and is told of a stalled run.
+SMALL_SHARE = 1e-2
 # The largest objective, constraint or slope of a usable design: steps need squares of them.
 LARGEST_ROW = 1e140
 
@@ -188,6 +193,11 @@ def verdict(
             f"the objective, {state.best_objective:.2g}, cannot be below {bound:g}, and what is left is within the "
             f"tolerance {settings.tolerance:.2g} of what the first design had to lose"
         )
+    if stuck and holds and nothing_is_promised(state, settings.tolerance):
+        return RunStatus.CONVERGED, (
+            f"the last steps gained what the curvature that was learnt had promised, and it promises no more than "
+            f"{state.promised / abs(state.objective):.2g} of the objective"
+        )
     to_gain = most_to_gain(state) if stuck and holds else inf
     if nothing_is_left(state, to_gain, settings.tolerance):
         return RunStatus.CONVERGED, (
@@ -199,7 +209,7 @@ def verdict(
     if stuck:
         return RunStatus.STALLED, (
             f"no step is found that lowers the objective, at a projected KKT residual of {state.kkt:.2g} "
-            f"where {settings.tolerance:.2g} was asked for{recent_change(state)}"
+            f"where {settings.tolerance:.2g} was asked for{_left(state, to_gain)}{recent_change(state)}"
         )
     if state.iteration >= settings.max_iterations:
         return RunStatus.MAX_ITERATIONS, (
@@ -207,6 +217,15 @@ def verdict(
             f"at a projected KKT residual of {state.kkt:.2g}{recent_change(state)}"
         )
     return RunStatus.RUNNING, ""
+
+
+def _left(state: GsaoState, to_gain: float) -> str:
+    """What is left to be gained, as `BundleMethod.most_to_gain` tells it, as a part of a sentence; nothing where that
+    is no small share of the objective."""
+    if not to_gain <= SMALL_SHARE * abs(state.objective):
+        return ""
+    share = to_gain / abs(state.objective)
+    return f"; the slopes here and of designs tried beside it leave at most {share:.2g} of the objective to be gained"
 
 
 def recent_change(state: GsaoState) -> str:
@@ -235,6 +254,12 @@ def is_at_bound(state: GsaoState, tolerance: float, bound: float) -> bool:
 def nothing_is_left(state: GsaoState, to_gain: float, tolerance: float) -> bool:
     """Whether what is left to be gained, as `BundleMethod.most_to_gain` tells it, is within a share of U."""
     return to_gain < tolerance * abs(state.objective)
+
+
+def nothing_is_promised(state: GsaoState, tolerance: float) -> bool:
+    """Whether a smooth objective has come to where its curvature, which foretold the last steps truly, promises next to
+    nothing: what is left to be gained is then a small multiple of the promise, far below the tolerance."""
+    return state.promised <= PROMISED_SHARE * tolerance * abs(state.objective)
 
 
 def is_least(state: GsaoState, tolerance: float) -> bool:

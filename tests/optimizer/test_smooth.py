@@ -9,7 +9,7 @@ from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
 from mdstopo.optimizer import competing_rows
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.bundle_method import FARTHEST, LEAST_LEFT, MOST_LEFT, _share_to_least
+from mdstopo.optimizer.bundle_method import FARTHEST, LEAST_LEFT, MOST_LEFT, TRUE_STEPS, _share_to_least
 from mdstopo.optimizer.curvature import learnt
 from mdstopo.optimizer.gsao import HAND_OVER, Gsao
 from mdstopo.optimizer.interface import run
@@ -186,3 +186,60 @@ def test_a_smooth_energy_goes_on_by_curvature_after_the_separable_model_has_had_
         assert not any(uses[: HAND_OVER - 1])
         last[smooth] = uses[HAND_OVER - 1 :]
     assert last == {True: [True, True], False: [False, False]}
+
+
+def valley(n, spread, rounding, seed=0):
+    """A quadratic with curvatures from 1 to 1/spread in oblique directions, 1 at its least value inside the bounds.
+
+    rounding: relative, of values, and of gradients in the largest entry, as that of adaptive steps.
+    """
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    matrix = (turn * np.logspace(0.0, -np.log10(spread), n)) @ turn.T
+    least = rng.uniform(0.2, 0.8, n)
+
+    def functions(x):
+        away = x - least
+        slope = matrix @ away
+        wave = np.sin(3e6 * x * np.arange(1, n + 1))
+        value = (1.0 + 0.5 * away @ slope) * (1.0 + rounding * np.sin(1e7 * x.sum()))
+        return np.array([value]), (slope + rounding * np.abs(slope).max() * wave)[None]
+
+    return Toy(functions, rng.uniform(0.05, 0.95, n), 0.0, 1.0)
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-9, 1e-7])
+@pytest.mark.parametrize("spread", [1e2, 1e4, 1e7])
+@pytest.mark.parametrize("n", [8, 20])
+def test_a_smooth_run_that_says_converged_leaves_less_than_its_tolerance(n, spread, rounding) -> None:
+    problem = valley(n, spread, rounding)
+    problem.competes, problem.smooth = True, True
+    state = run(Gsao(problem, settings(max_iterations=400)))
+    exact = float(valley(n, spread, 0.0).functions(state.best_alpha)[0][0]) - 1.0
+    if not rounding:
+        assert state.status is RunStatus.CONVERGED
+    assert state.status is not RunStatus.CONVERGED or exact < 1e-6
+
+
+def test_a_flat_optimum_converges_by_the_curvature_that_foretold_the_last_steps() -> None:
+    """Its residual is no less than 1e-5: the gradient is rounding, in units that have become as small."""
+    problem = valley(20, 1e7, 0.0)
+    problem.competes, problem.smooth = True, True
+    state = run(Gsao(problem, settings(max_iterations=400)))
+    assert state.status is RunStatus.CONVERGED
+    assert "the curvature that was learnt had promised" in state.reason
+    assert state.kkt > 1e-6
+    assert state.promised <= 1e-8 * state.objective
+
+
+def test_a_promise_that_a_step_exceeds_tenfold_counts_no_more() -> None:
+    problem = valley(8, 1e4, 0.0)
+    problem.competes, problem.smooth = True, True
+    optimizer = Gsao(problem, settings(max_iterations=400))
+    state = optimizer.start()
+    while state.true_steps < TRUE_STEPS:
+        state = optimizer.step(state)
+    state.promised = 1e-2 * state.predicted
+    after = optimizer.step(state)
+    assert after.history.accepted[-1]
+    assert after.promised > state.promised
