@@ -344,11 +344,12 @@ class BundleMethod:
 
     def _learn_curvature(self, state: GsaoState, new: Bundle, d: Floats) -> None:
         """Keep the step d (N,) and the change of the Lagrangian's gradient over it, where that can be told."""
-        change = self.model.gradient_change(state.bundle, new, d, state.multipliers, self._is_smooth(state))
+        smooth = self._is_smooth(state)
+        change = self.model.gradient_change(state.bundle, new, d, state.multipliers, smooth)
         if change is None or not self.model.lengths(d)[0] > 0.0:
             return
-        state.steps = self.model.learnt(state.steps, d)
-        state.changes = self.model.learnt(state.changes, change)
+        state.steps = self.model.learnt(state.steps, d, smooth)
+        state.changes = self.model.learnt(state.changes, change, smooth)
 
     def _steer(self, state: GsaoState, rows: Bundle, around: Around, here: Floats) -> Trial:
         """The trial, at penalties that make it take away enough of the violation that can go in the box.

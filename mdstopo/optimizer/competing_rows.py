@@ -29,8 +29,8 @@ from mdstopo.optimizer.stack import Slopes, Stack, joined
 #: violated, but little more, or it would reject long steps along a curved limit; the least share of the violation that
 #: could go which has to go; the factor on penalties until it does, and how often
 MARGIN, STEER, RAISE, RAISES = 1.2, 0.3, 5.0, 8
-#: steps that curvature is learnt from, where B is a matrix and where it is not
-STEPS, FEW_STEPS = 60, 12
+#: steps that curvature is learnt from, where B is a matrix, where it is that of a smooth objective, and where B is none
+STEPS, SMOOTH_STEPS, FEW_STEPS = 60, 120, 12
 #: the least curvature, of the largest gradient entry over the range
 FLOOR = 1e-5
 #: cosine of two gradients from which on they are taken for those of one peak
@@ -136,8 +136,8 @@ class RowModel(Protocol):
     def lengths(self, d: Floats) -> tuple[float, float]:
         """The largest change of a variable and the length of a step d (N,), in ranges."""
 
-    def learnt(self, known: Slopes, more: Floats) -> Slopes:
-        """The last steps, or changes, that curvature is learnt from, and one (N,) more."""
+    def learnt(self, known: Slopes, more: Floats, smooth: bool) -> Slopes:
+        """The last steps, or changes, that curvature is learnt from, and one (N,) more; smooth: as of `SecantPairs`."""
 
 
 class DenseModel:
@@ -168,9 +168,14 @@ class DenseModel:
         scaled = d / self.space.range
         return float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
 
-    def learnt(self, known: Slopes, more: Floats) -> Slopes:
-        """The steps, or changes, that curvature is learnt from, as of `RowModel`."""
-        return joined(known, more[None])[-(STEPS if len(more) <= FEW else FEW_STEPS) :]
+    def learnt(self, known: Slopes, more: Floats, smooth: bool) -> Slopes:
+        """The steps, or changes, that curvature is learnt from, as of `RowModel`.
+
+        Of a smooth objective they are more than it has variables, as far as they may: with as many steps as variables
+        the flat directions of a long valley are forgotten before all are known, and it is crept along.
+        """
+        most = FEW_STEPS if len(more) > FEW else SMOOTH_STEPS if smooth else STEPS
+        return joined(known, more[None])[-most:]
 
 
 @dataclass(frozen=True, slots=True)

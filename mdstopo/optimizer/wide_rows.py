@@ -172,7 +172,7 @@ class WideModel:
         scaled = d / self.unit
         return float(self.measures.steepest(scaled[None])[0]), float(np.sqrt(total(scaled, scaled)))
 
-    def learnt(self, known: Slopes, more: Floats) -> Slopes:
+    def learnt(self, known: Slopes, more: Floats, smooth: bool) -> Slopes:
         """The steps, or changes, that curvature is learnt from, as of `RowModel`."""
         return _stack(joined(known, more[None]))[-PAIRS:]
 

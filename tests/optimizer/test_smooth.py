@@ -232,6 +232,15 @@ def test_a_flat_optimum_converges_by_the_curvature_that_foretold_the_last_steps(
     assert state.promised <= 1e-8 * state.objective
 
 
+def test_a_long_valley_of_many_variables_is_not_crept_along() -> None:
+    """With as many steps as variables to learn curvature from, 300 evaluations left 1e-9 of the objective."""
+    problem = valley(60, 1e4, 0.0)
+    problem.competes, problem.smooth = True, True
+    state = run(Gsao(problem, settings(max_iterations=160)))
+    assert state.status is RunStatus.CONVERGED
+    assert state.best_objective < 1.0 + 1e-9
+
+
 def test_a_promise_that_a_step_exceeds_tenfold_counts_no_more() -> None:
     problem = valley(8, 1e4, 0.0)
     problem.competes, problem.smooth = True, True
