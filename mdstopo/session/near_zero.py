@@ -4,6 +4,8 @@ An error is measured relative to the objective. Where a response is very small b
 from, rounding of that motion is larger than the error that the response may have, and steps are made ever shorter.
 """
 
+from collections.abc import Callable
+
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.case.responses.response_units import constrained, unit_of_value, words
@@ -14,6 +16,25 @@ from mdstopo.general.responses.extremes import VALUE
 MANY, TIMES = 500, 4
 #: expressions that have a small amount more than a response, and the like of its square
 ADDED, SQUARED = "x + 1e-3", "sqrt(x^2 + 1e-6)"
+
+
+class NearZeroNotice:
+    """Says once of a run that an integral is so near to zero that it makes evaluations slow.
+
+    case: the design problem. engine: its evaluator. notify: is given the warning.
+    """
+
+    def __init__(self, case: Case, engine: object, notify: Callable[[str], None]) -> None:
+        self._case = case
+        self._engine = engine
+        self._notify = notify
+        self._is_told = False
+
+    def look(self) -> None:
+        """Look at the last evaluation."""
+        if not self._is_told and (sentence := near_zero(self._case, self._engine)):
+            self._notify(f"warning: {sentence}")
+            self._is_told = True
 
 
 def near_zero(case: Case, engine: object) -> str:
