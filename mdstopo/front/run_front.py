@@ -45,7 +45,7 @@ Floats = NDArray[np.float64]
 Stop = Callable[[], bool]
 
 #: seconds of work from which on other processes are worth their start
-WORTH = 6.0
+WORTH_PROCESSES = 6.0
 #: tasks that a point takes, and evaluations of a task, about: for guesses of the time that is left
 TASKS, EVALUATIONS = 3.2, 11.0
 #: iterations of the first task that are tried, and thrown away, to see how long the work takes
@@ -115,7 +115,7 @@ def run_front(
     stop_requested: Stop | None = None,
     notify: Callable[[str], None] | None = None,
     command: str = "",
-    worth: float = WORTH,
+    worth: float = WORTH_PROCESSES,
 ) -> FrontOutcome:
     """Compute a front and keep its result file up to date.
 

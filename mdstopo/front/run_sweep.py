@@ -14,10 +14,10 @@ from mdstopo.case.scene.candidates import pairs_of
 from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import cores
 from mdstopo.front.cluster import Cluster
-from mdstopo.front.directions import MOST, parse_range
+from mdstopo.front.directions import MOST_POINTS, parse_range
 from mdstopo.front.jobs import Setting, Trial, first
 from mdstopo.front.pool import Here, Pool, Processes
-from mdstopo.front.run_front import WORTH, Snapshot
+from mdstopo.front.run_front import WORTH_PROCESSES, Snapshot
 from mdstopo.plan.priced_designs import in_case, with_all
 from mdstopo.plan.solve_task import Found, case_key, failed
 from mdstopo.plan.stored_tasks import read_tasks, tasks_part
@@ -60,8 +60,8 @@ def combinations(sets: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
         if "" in columns[-1]:
             raise ValueError(f"{key}: found {text!r}; a value is missing")
     count = int(np.prod([len(column) for column in columns]))
-    if count > MOST:
-        raise ValueError(f"{count} combinations are more than {MOST}")
+    if count > MOST_POINTS:
+        raise ValueError(f"{count} combinations are more than {MOST_POINTS}")
     return tuple(product(*columns))
 
 
@@ -79,7 +79,7 @@ def run_sweep(
     stop_requested: Callable[[], bool] | None = None,
     notify: Callable[[str], None] | None = None,
     command: str = "",
-    worth: float = WORTH,
+    worth: float = WORTH_PROCESSES,
 ) -> SweepOutcome:
     """Run a case with every combination of values of some keys, and keep the result file up to date.
 

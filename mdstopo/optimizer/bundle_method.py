@@ -8,12 +8,12 @@ import numpy as np
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.competing_rows import (
     FLOOR,
-    MARGIN,
-    NOTHING,
+    NO_VIOLATION,
     NULL_STEP_SHRINK,
     RAISE,
     RAISES,
     STEER,
+    VIOLATION_COST,
     Around,
     RowModel,
     SecantPairs,
@@ -48,7 +48,7 @@ RETURN_TRUST, LEAST_RESET_TRUST = 1e-3, 1e-2
 #: factor on the box, or on a step that was shorter, where the model proves poor; and the least box, in ranges, after it
 SHRINK, LEAST_TRUST = 0.5, 1e-12
 #: shares of the box above which a step is held back by it, and below which a step leaves it too wide
-LONG, NARROW = 0.5, 0.1
+LONG_STEP, NARROW_STEP = 0.5, 0.1
 #: of a smooth objective: lengths of the last step beyond which rows from elsewhere are dropped; and the least and the
 #: most that is left of a step that was rejected
 FARTHEST, LEAST_LEFT, MOST_LEFT = 5.0, 0.1, 0.6
@@ -89,7 +89,7 @@ class BundleMethod:
         tolerance = self.settings.tolerance
         done = state.kkt <= tolerance
         if state.restoring:
-            kept = plain_violation(state.sample) <= NOTHING * tolerance
+            kept = plain_violation(state.sample) <= NO_VIOLATION * tolerance
             # what is left may be rounding of a steep limit: within the tolerance it is kept
             if kept or ((stuck or done) and state.violation <= tolerance):
                 self._return_to_objective(state)
@@ -171,7 +171,7 @@ class BundleMethod:
         groups = int(rows.group.max(initial=0)) + 1
         steepest = largest_of_groups(rows.steepest, rows.group, groups)
         steepest = np.where(np.isfinite(steepest) & (steepest > 0.0), steepest, 1.0)
-        return np.asarray(MARGIN * steepest[0] / steepest[1:])
+        return np.asarray(VIOLATION_COST * steepest[0] / steepest[1:])
 
     # -- the steps
 
@@ -316,12 +316,12 @@ class BundleMethod:
     def _trust_after_step(self, trust: float, size: float, ratio: float) -> float:
         """The box after an accepted step of this size, both in ranges; ratio: of actual to predicted decrease."""
         settings = self.settings
-        if ratio > settings.number("good_ratio") and size > LONG * trust:
+        if ratio > settings.number("good_ratio") and size > LONG_STEP * trust:
             return min(1.0, settings.number("trust_grow") * trust)
         if ratio < settings.number("poor_ratio"):
             return max(SHRINK * min(trust, size), LEAST_TRUST)
-        if size < NARROW * trust:  # a box of the size of the steps is solved to more digits
-            return max(SHRINK * trust, size / NARROW)
+        if size < NARROW_STEP * trust:  # a box of the size of the steps is solved to more digits
+            return max(SHRINK * trust, size / NARROW_STEP)
         return trust
 
     def _bundle(self, sample: Sample, restoring: bool) -> Bundle:
@@ -350,7 +350,7 @@ class BundleMethod:
         if not len(state.penalty):
             return trial
         reach = around.reach(rows.subset(rows.group > 0))
-        tiny = max(NOTHING * self.settings.tolerance, ROUNDING * float(reach.max(initial=0.0)))
+        tiny = max(NO_VIOLATION * self.settings.tolerance, ROUNDING * float(reach.max(initial=0.0)))
         # as in the merit, so that penalties raised in proportion lead to the least of this sum
         weight = state.penalty / state.penalty.max()
 
@@ -372,7 +372,8 @@ class BundleMethod:
             trial.violates(rows, state.penalty, tiny),
             state.penalty,
             np.maximum(
-                np.maximum(MARGIN * carried, PENALTY_FALL * state.penalty), LEAST_PENALTY * self.first_penalty(rows)
+                np.maximum(VIOLATION_COST * carried, PENALTY_FALL * state.penalty),
+                LEAST_PENALTY * self.first_penalty(rows),
             ),
         )
         return trial

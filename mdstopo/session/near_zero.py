@@ -13,7 +13,7 @@ from mdstopo.general.responses.extremes import VALUE
 
 #: steps that end where they do for the sake of integrals alone, from which on it is told, and how many times as many
 #: they are as the others
-MANY, TIMES = 500, 4
+MANY_STEPS, TIMES_OTHERS = 500, 4
 #: expressions that have a small amount more than a response, and the like of its square
 ADDED, SQUARED = "x + 1e-3", "sqrt(x^2 + 1e-6)"
 
@@ -54,7 +54,7 @@ def near_zero(case: Case, engine: object) -> str:
         driver = engine.driver(name)
         assert isinstance(driver, GeneralDriver)
         asked, others = len(driver.quadrature_breakpoints), driver.count - len(driver.quadrature_breakpoints)
-        if asked < MANY or asked < TIMES * others:
+        if asked < MANY_STEPS or asked < TIMES_OTHERS * others:
             continue
         found = [f"{_words(case, aim)} is {driver.rows[j, 0, VALUE]:.2g} {unit_of_value(aim)}" for j, aim in integrals]
         # of a mean square the least value stays where it is if the squares have an amount more

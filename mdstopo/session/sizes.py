@@ -258,7 +258,7 @@ class Sizes:
         kept = [place for place in groups if x[place] >= KEPT * least[place]]
         choices = math.prod(len(group.sizes) for group in groups.values())
         alone = set(np.flatnonzero(problem.upper > problem.lower).tolist()) <= set(groups)
-        everyone = choices <= size_search.FEW and alone and (len(kept) > 0 or not problem.linear.equal.any())
+        everyone = choices <= size_search.FEW_CHOICES and alone and (len(kept) > 0 or not problem.linear.equal.any())
         return np.array(sorted(groups if everyone else kept), dtype=np.int64)
 
     def _more(self, problem: Problem, x: Floats, kept: Ints, progress: SearchProgress) -> Ints:

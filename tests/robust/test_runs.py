@@ -138,7 +138,7 @@ def test_forces_that_compete_at_several_points_end_where_those_of_one_do():
 
 @pytest.mark.parametrize("room", [20_000_000, 100])
 def test_points_are_asked_for_the_peaks_that_memory_has_room_for(room, monkeypatch):
-    monkeypatch.setattr(ensemble, "ROOM", room)
+    monkeypatch.setattr(ensemble, "ROOM_FOR_GRADIENTS", room)
     section = {"scenarios": {"one": {}, "other": {}}, "objectives": {"f": {"measure": "worst"}}}
     case = wires(uncertainty=section)
     engine = evaluator_of(case)

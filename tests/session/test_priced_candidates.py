@@ -80,7 +80,7 @@ def case_from(scene: dict[str, Any]) -> Case:
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs begin with some 40 of the 640 candidates, and a few enter at once."""
     monkeypatch.setattr(candidates, "START_SET", 40)
-    monkeypatch.setattr(pricing, "MOST", 20)
+    monkeypatch.setattr(pricing, "MOST_ENTERING", 20)
 
 
 def by_points(outcome: Outcome) -> dict[tuple[int, int], float]:
