@@ -33,7 +33,7 @@ LOOKS, LATER_LOOKS = (SECOND_TRIAL, 6, 7, 8, 9, 10, 12, 14, 16, 18), tuple(range
 QUOTAS, SHARE_GOING_ON = (20, 40), 1.0 / 3.0
 #: a start that has fallen by this share of U within so many iterations goes on, too
 FALLING, LATELY = 0.1, 5
-#: a start whose U is higher than the best by more than this share of it does not
+#: a start whose U is higher than the best by more than this share of the best does not go on
 FAR_BEHIND = 1.0
 #: two designs are one optimum where U differs by less than this, relative, and alpha by less than that on average
 SAME_VALUE, SAME_DESIGN = 1e-3, 2e-2
@@ -367,4 +367,11 @@ def _found(states: Sequence[State | None], group: Sequence[int]) -> Found:
     own = [state for index in group if (state := states[index]) is not None]
     best = own[0]
     evaluations = sum(state.evaluations for state in own)
-    return Found(best.best_objective, best.best_plain, tuple(sorted(group)), evaluations, best.status, best.kkt)
+    return Found(
+        objective=best.best_objective,
+        violation=best.best_plain,
+        starts=tuple(sorted(group)),
+        evaluations=evaluations,
+        status=best.status,
+        kkt=best.kkt,
+    )
