@@ -13,7 +13,7 @@ import numpy as np
 
 from mdstopo.case.design.exchange import Side, exchange_ends
 from mdstopo.case.methods.over_time import REDUCTIONS
-from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import Case, MemberGroup, Objective, ReducedResponse, ResponseRow, VolumeRow
 from mdstopo.case.objects.design_space import DesignSpace
 from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.text.errors import CaseError
@@ -100,8 +100,8 @@ class DesignProblem:
         self.smooth = case.uncertainty is None and all(map(_is_smooth, self._objectives))
         #: no U is below it
         self.objective_bound = lower_bound_of(self._objectives[0]) if one else -np.inf
-        aims: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
-        members = any(kind_of(each.response).of_members for each in aims)
+        responses: list[ReducedResponse] = [*self._objectives, *(row for _, row in self._responses)]
+        members = any(kind_of(each.response).of_members for each in responses)
         # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
         cones = len(self.initial) < VERY_MANY_VARIABLES
         few, many = Rows(*PEAKS_OF_RESPONSE, cones=cones), Rows(*PEAKS_OF_MEMBERS, cones=cones)
@@ -367,10 +367,10 @@ def lower_bound_of(objective: Objective) -> float:
     return 0.0 if positive and sign_of(objective) > 0.0 else -np.inf
 
 
-def competes(aim: Objective | ResponseRow, sign: float) -> bool:
+def competes(reduced: ReducedResponse, sign: float) -> bool:
     """Whether every competing peak of an objective or a constraint is a lower bound of sign times its value."""
-    reduction = REDUCTIONS[aim.over_time]
-    if reduction.at_end and kind_of(aim.response).of_members:
+    reduction = REDUCTIONS[reduced.over_time]
+    if reduction.at_end and kind_of(reduced.response).of_members:
         return sign > 0.0  # members compete at the end, too
     return reduction.is_largest if sign > 0.0 else reduction.is_smallest
 

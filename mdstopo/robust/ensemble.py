@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.case.model import Case, Objective, ResponseRow
+from mdstopo.case.model import Case, ReducedResponse, ResponseRow
 from mdstopo.case.objects.uncertain import Measure
 from mdstopo.design_problem import competes, sign_of
 from mdstopo.engine import Evaluator
@@ -257,7 +257,7 @@ class Ensemble(Evaluator):
         return all_peaks
 
     def _measured(
-        self, of: Objective | ResponseRow, measure: Measure, found: Mapping[int, tuple[Peak, ...]], sign: float
+        self, of: ReducedResponse, measure: Measure, found: Mapping[int, tuple[Peak, ...]], sign: float
     ) -> tuple[Peak, ...]:
         # what bounds a value from the good side is no row: the value itself stands for it
         own = {i: peaks if competes(of, sign) else peaks[:1] for i, peaks in found.items()}

@@ -7,7 +7,7 @@ from, rounding of that motion is larger than the error that the response may hav
 from collections.abc import Callable
 
 from mdstopo.case.methods.over_time import REDUCTIONS
-from mdstopo.case.model import Case, Objective, ResponseRow
+from mdstopo.case.model import Case, ReducedResponse, ResponseRow
 from mdstopo.case.responses.response_units import constrained, unit_of_value, words
 from mdstopo.general.responses.extremes import VALUE
 
@@ -46,9 +46,9 @@ def near_zero(case: Case, engine: object) -> str:
     if not isinstance(engine, Evaluator) or not engine.beyond:
         return ""
     for name in engine.scenes:
-        aims: list[Objective | ResponseRow] = [each for each in case.objectives if each.load_case == name]
-        aims += [each for each in case.constraints if isinstance(each, ResponseRow) and each.load_case == name]
-        integrals = [(j, aim) for j, aim in enumerate(aims) if REDUCTIONS[aim.over_time].is_integral]
+        responses: list[ReducedResponse] = [each for each in case.objectives if each.load_case == name]
+        responses += [each for each in case.constraints if isinstance(each, ResponseRow) and each.load_case == name]
+        integrals = [(j, reduced) for j, reduced in enumerate(responses) if REDUCTIONS[reduced.over_time].is_integral]
         if not integrals:
             continue
         driver = engine.driver(name)
@@ -56,9 +56,12 @@ def near_zero(case: Case, engine: object) -> str:
         asked, others = len(driver.quadrature_breakpoints), driver.count - len(driver.quadrature_breakpoints)
         if asked < MANY_STEPS or asked < TIMES_OTHERS * others:
             continue
-        found = [f"{_words(case, aim)} is {driver.rows[j, 0, VALUE]:.2g} {unit_of_value(aim)}" for j, aim in integrals]
+        found = [
+            f"{_words(case, reduced)} is {driver.rows[j, 0, VALUE]:.2g} {unit_of_value(reduced)}"
+            for j, reduced in integrals
+        ]
         # of a mean square the least value stays where it is if the squares have an amount more
-        formula = SQUARED if any(REDUCTIONS[aim.over_time].is_squared for _, aim in integrals) else ADDED
+        formula = SQUARED if any(REDUCTIONS[reduced.over_time].is_squared for _, reduced in integrals) else ADDED
         return (
             f"{' and '.join(found)}: an integral so near to zero takes {driver.count:,} steps where the motion takes "
             f"{max(others, 1):,}, because solver.tolerance is relative to it; where less than some amount is as good "
@@ -67,8 +70,8 @@ def near_zero(case: Case, engine: object) -> str:
     return ""
 
 
-def _words(case: Case, aim: Objective | ResponseRow) -> str:
+def _words(case: Case, reduced: ReducedResponse) -> str:
     """An objective by its name and what it measures, a constraint by what it bounds."""
-    if isinstance(aim, ResponseRow):
-        return constrained(case, aim)
-    return f"objective {aim.name} ({aim.over_time} {words(aim.response)})"
+    if isinstance(reduced, ResponseRow):
+        return constrained(case, reduced)
+    return f"objective {reduced.name} ({reduced.over_time} {words(reduced.response)})"

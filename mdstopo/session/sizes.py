@@ -226,7 +226,7 @@ class Sizes:
 
     def part(self) -> Datasets:
         """The datasets that a file keeps of the search, and before its end the best choice as the design."""
-        if self._search is None:  # of a run that is opened again: as it was
+        if self._search is None:  # nothing was searched in this process: keep what an earlier one has found
             return {} if self._before is None else _catalogue_part(self._before)
         progress = self._search.progress
         part: Datasets = {f"{SEARCH}/{name}": array for name, array in self._search.to_arrays().items()}

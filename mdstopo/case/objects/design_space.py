@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.objects.aims import Variable, VolumeRow
+from mdstopo.case.objects.problem_parts import Variable, VolumeRow
 
 #: the largest bound of alphas that are counted in a unit of their own
 SMALL_BOUND = 0.25
