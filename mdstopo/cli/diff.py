@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 #: keys that are told; more is counted
 MOST_KEYS = 40
-#: members that only one result has, of which it is told which they are
+#: of members that only one result has, so many are named
 NAMED_MEMBERS = 8
 
 

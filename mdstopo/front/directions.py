@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-#: points of one front
+#: points of one front at most
 MOST_POINTS = 100_000
 
 

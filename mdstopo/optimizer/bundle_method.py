@@ -157,7 +157,8 @@ class BundleMethod:
         state.penalty = RESTORED_PENALTY * state.penalty
 
     def _reset(self, state: GsaoState) -> bool:
-        """Drop rows of other designs, which may forbid what is possible; False where that was done too often here."""
+        """Drop rows that belong to other designs: they may exclude steps that are possible. False where that was done
+        `RESETS` times already."""
         if state.resets >= RESETS:
             return False
         trust = RESET_TRUST * RESET_SHRINK**state.resets

@@ -31,8 +31,8 @@ from mdstopo.optimizer.wide_interior import CURVED, LIMIT, LINE, NO_BOUND, NO_MU
 from mdstopo.optimizer.wide_numbers import stride, threads_for
 from mdstopo.optimizer.wide_passes import PIECE
 
-#: variables of a sample, at least and at most, and every how many variables one more; of a sample of those in doubt the
-#: least. Variables up to which all in doubt are solved for at once
+#: variables of a sample at least (of a sample of those in doubt, too) and at most; between, a sample has one of so
+#: many. Up to how many variables in doubt are solved for at once, without a sample
 LEAST_SAMPLE, LARGEST_SAMPLE, VARIABLES_PER_MORE, FEW_IN_DOUBT = 768, 4_096, 256, 3_000
 #: mean product and residual of a solution of the small program, in its own scale; what counts as one; and of a sample
 EXACT, ENOUGH, ROUGH = (1e-14, 1e-11), (1e-8, 1e-8), (1e-9, 1e-9)

@@ -1,4 +1,5 @@
-"""Integrals over time of what has kinks: a norm that passes zero, the largest of several forces that changes hands.
+"""Integrals over time of what has kinks: a norm that passes zero, the largest force where it passes to
+another member.
 
 A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
 first sampled, and computed once more with steps that end at its kinks (and around bends that are nearly such, where

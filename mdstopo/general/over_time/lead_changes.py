@@ -1,4 +1,5 @@
-"""When two members of a group change hands: the places in steps at which their forces are equal, or equal and opposite.
+"""When the largest force of a group passes from one member to another: the places in steps at which the forces of two
+members are equal, or equal and opposite.
 
 All pairs of a batch of steps are looked for together, on arrays: what takes long is the way from Python to the kernel
 that computes forces, and one call serves any number of places. The cubics through samples say first which pairs may
@@ -16,7 +17,7 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: a member whose cubic stays below the largest force by less than this share of it may lead in truth
 MAY_LEAD = 1e-3
-#: how far a cubic between two samples may be off beside, relative to the largest rate there, per interval
+#: what is added to it: how far a cubic between two samples may be off, relative to the largest rate there, per interval
 OFF = 1e-4
 #: members that are compared between two samples at most, those with the largest forces; of more that come near the
 #: largest force there at once, changes between the others are not looked for
@@ -110,7 +111,7 @@ class CompetingMembers(NamedTuple):
 def lead_changes(
     force: FloatArray, rate: FloatArray, may: NDArray[np.bool_], fine: FloatArray, exact: Exact
 ) -> tuple[IndexArray, FloatArray]:
-    """Where members may change hands: number of the step (R,), fraction of it (R,), in order of time.
+    """Where the lead may pass to another member: number of the step (R,), fraction of it (R,), in order of time.
 
     force (C, W, K): forces of members at samples of steps (N). rate (C, W, K): their rates, per interval (N).
     may (C, W, K - 1): which members may lead between two samples.
@@ -129,8 +130,10 @@ def lead_changes(
 def _changes_in(
     competing: CompetingMembers, force: FloatArray, fine: FloatArray, exact: Exact
 ) -> tuple[IndexArray, FloatArray]:
-    """Where competing members change hands: number of the step (R,), fraction of it (R,); further arguments as of
-    `lead_changes`."""
+    """Where the lead passes between competing members: number of the step (R,), fraction of it (R,).
+
+    Further arguments: as of `lead_changes`.
+    """
     pairs = _pairs(competing, force)
     a, b = (competing.curves.some(rows, pairs.cell) for rows in pairs.rows)
     difference = Cubics(*(x - pairs.sign * y for x, y in zip(a, b, strict=True)))

@@ -137,7 +137,7 @@ def _different(force: FloatArray) -> IndexArray:
 
 
 def _changes(group: _Group, steps: IndexArray, who: IndexArray, may: NDArray[np.bool_]) -> Iterator[tuple[int, float]]:
-    """Steps and fractions of them at which members may change hands, in order of time.
+    """Steps and fractions of them at which the lead may pass to another member, in order of time.
 
     steps (W,): in which several members may lead. who (C,): members. may (C, W): which of them may lead in which step.
     """

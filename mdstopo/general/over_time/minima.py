@@ -1,7 +1,7 @@
 """Minima over time of what has kinks: the largest of several forces, an absolute value, a norm.
 
-The minimum of the largest force may stand where two members change hands: there f_a falls and f_b rises, both have the
-value, and so does the minimum of a design nearby, where the time t of the crossing is another one:
+The minimum of the largest force may stand where it passes from one member to another: there f_a falls and f_b rises,
+both have the value, and so does the minimum of a design nearby, where the time t of the crossing is another one:
 
     dG = df_a + f_a' dt = df_b + f_b' dt,   so   dG = (f_b' df_a - f_a' df_b) / (f_b' - f_a'),
 

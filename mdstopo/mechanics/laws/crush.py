@@ -16,7 +16,7 @@ AT_SWITCH = 1e-12
 
 @inline
 def crush_force(p, x, mode):
-    """Force, its slopes by x and xd, and energy with its slope by x; the energy is what it gives back, f^2 / (2 k)."""
+    """Force, its slopes by x and xd, energy and its slope by x; energy is what unloading gives back, f^2 / (2 k)."""
     if mode == OPEN:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     if mode == CRUSHING:
