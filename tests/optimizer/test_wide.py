@@ -48,7 +48,7 @@ def states(problem, steps, monkeypatch=None, **options):
     if monkeypatch is not None:
         monkeypatch.setattr(wide, "MANY_VARIABLES", 10**9)
         for module in (gsao, separable, wide, wide_numbers):
-            monkeypatch.setattr(module, "WIDE", 10**9)
+            monkeypatch.setattr(module, "VERY_MANY_VARIABLES", 10**9)
     optimizer = Gsao(problem, settings("default", options, max_iterations=100))
     found = [optimizer.start()]
     while found[-1].running and len(found) < steps:
