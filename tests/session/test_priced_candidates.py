@@ -27,7 +27,8 @@ from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus, Status
 from mdstopo.store.result_reader import read_result
 from mdstopo.store.stored_case import case_of
-from tests.session.test_runs_and_files import assert_same_files, stop_after
+from tests.reading import case_from
+from tests.result_files import assert_same_files, stop_after
 
 MOUNTS, FRAME = 16, 40
 
@@ -70,10 +71,6 @@ def stiff(candidates: str = "priced") -> dict[str, Any]:
     scene = engine(candidates, objectives={"G": {"response": "energy", "over_time": "mean"}})
     scene["members"]["struts"]["law"]["stiffness"] = 20000
     return scene
-
-
-def case_from(scene: dict[str, Any]) -> Case:
-    return read_case(json.dumps(scene))
 
 
 @pytest.fixture
