@@ -13,7 +13,7 @@ from benchmarks.hand import HANDS, alike, even, places, sized
 from benchmarks.scenes import CASES
 from mdstopo import Case, Evaluation, evaluate, load_case, optimize, simulate
 from mdstopo.bench.tables import Table, significant, verdict
-from mdstopo.case.model import Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import ReducedResponse, VolumeRow
 from mdstopo.case.objects.parts import MemberGroup
 from mdstopo.case.responses.response_units import words
 from mdstopo.optimizer.scalarisation import Scalarisation
@@ -123,7 +123,7 @@ def volume_of(case: Case, row: VolumeRow) -> str:
     return "volume of all" if whole else f"volume of {', '.join(row.groups)}"
 
 
-def described(looked: Objective | ResponseRow) -> str:
+def described(looked: ReducedResponse) -> str:
     """What is looked at, in words."""
     return f"{looked.over_time} {words(looked.response)}, {looked.load_case}"
 

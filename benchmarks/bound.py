@@ -71,13 +71,13 @@ def _case(**sections: Any) -> Case:
     return read_case(json.dumps(made))
 
 
-def _stop(aim: str, other: str, limit: float, component: str, end: float = 1.0) -> Case:
+def _stop(objective: str, other: str, limit: float, component: str, end: float = 1.0) -> Case:
     over = "max" if component == "norm" else "max_abs"
     seen = {"body": "load", "component": component}
     return _case(
         time={"end": end},
         bodies={"load": {"mass": 10, "inertia": 1, "position": [0, 0], "velocity": [2, 0]}},
-        objectives={"G": {"response": {aim: seen}, "over_time": over}},
+        objectives={"G": {"response": {objective: seen}, "over_time": over}},
         constraints=[{"response": {other: seen}, "over_time": over, "limit": limit}],
     )
 
@@ -149,14 +149,14 @@ def tries(seed: int, count: int) -> Iterator[Tried]:
     values = _values(case_of(made), lambda case: designs(rng, case, count))
     if len(values) < 10:
         return
-    for g, (aim, other) in enumerate((("acceleration", "travel"), ("travel", "acceleration"))):
+    for g, (objective, other) in enumerate((("acceleration", "travel"), ("travel", "acceleration"))):
         limit = float(np.quantile(values[:, 1 - g], (0.1, 0.5)[seed // len(KINDS) % 2]))
         best = float(values[values[:, 1 - g] <= limit, g].min())
-        yield Tried(kind, _bound(made, aim, other, limit), best)
+        yield Tried(kind, _bound(made, objective, other, limit), best)
 
 
-def _bound(made: Scene, aim: str, other: str, limit: float) -> float | None:
-    return bounds(with_limit(made, aim, other, limit))[aim].value
+def _bound(made: Scene, objective: str, other: str, limit: float) -> float | None:
+    return bounds(with_limit(made, objective, other, limit))[objective].value
 
 
 def _values(case: Case, drawn: Callable[[Case], np.ndarray]) -> np.ndarray:

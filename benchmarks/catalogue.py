@@ -69,7 +69,7 @@ def all_choices(case: Case, kept: list[int], offered: tuple[float, ...]) -> tupl
 
 def catalogue() -> Iterator[Table]:
     """Ten scenes: the search for the members kept beside all their choices, and a run beside all choices of all."""
-    few, much_worse = size_search.FEW, sizes.MUCH_WORSE
+    few, much_worse = size_search.FEW_CHOICES, sizes.MUCH_WORSE
     rows = []
     for number in range(len(SCENES)):
         case = scene(number)
@@ -78,9 +78,9 @@ def catalogue() -> Iterator[Table]:
         offered = sizes_of(number)
         kept = np.flatnonzero(continuous.alpha >= 0.5 * (offered[0] or offered[1])).tolist()
         # so that it is branch and bound for the members kept that is measured
-        size_search.FEW, sizes.MUCH_WORSE = 0, np.inf
+        size_search.FEW_CHOICES, sizes.MUCH_WORSE = 0, np.inf
         chosen = run_session(case).sizes
-        size_search.FEW, sizes.MUCH_WORSE = few, much_worse
+        size_search.FEW_CHOICES, sizes.MUCH_WORSE = few, much_worse
         whole = run_session(case).sizes
         assert chosen is not None
         assert whole is not None

@@ -15,7 +15,7 @@ from mdstopo.status import Status
 #: change, relative to what half the step gives, from which a step is far too large
 COARSE = 0.3
 #: displacements and speeds (m, rad, 1/s) that count as none
-NOTHING = 1e-9
+NO_MOTION = 1e-9
 
 _KINDS = "displacement", "rotation", "speed", "angular velocity"
 
@@ -37,7 +37,7 @@ def coarse(driver: SceneDriver, alpha: FloatArray) -> str:
     if half is None:
         return f"with half of {step:g} s the motion cannot be computed"
     for kind, one, other in zip(_KINDS, whole, half, strict=True):
-        if abs(one - other) > COARSE * other and max(one, other) > NOTHING:
+        if abs(one - other) > COARSE * other and max(one, other) > NO_MOTION:
             return f"half of {step:g} s changes the largest {kind} from {one:.3g} to {other:.3g}"
     return ""
 

@@ -13,14 +13,14 @@ import numpy as np
 
 from mdstopo.case.design.exchange import Side, exchange_ends
 from mdstopo.case.methods.over_time import REDUCTIONS
-from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import Case, MemberGroup, Objective, ReducedResponse, ResponseRow, VolumeRow
 from mdstopo.case.objects.design_space import DesignSpace
 from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.text.errors import CaseError
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
-from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
-from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.optimizer.scalarisation import MOST_ROWS_OF_U, NotPositiveError, Part, Scalarisation
+from mdstopo.optimizer.wide_numbers import VERY_MANY_VARIABLES
 from mdstopo.scene.moving_volumes import moving_volumes
 from mdstopo.scene.refusals import refusals
 from mdstopo.status import Status
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
 #: how far below the highest a peak may be to be a row, and how many of one response; of many members' forces more,
 #: because a design that lowers the largest raises others that are far below it
-NEAR, ALL = (0.3, 12), (0.6, 60)
+PEAKS_OF_RESPONSE, PEAKS_OF_MEMBERS = (0.3, 12), (0.6, 60)
 #: where the last row told is within this share of the largest, so many times as many are asked for, up to so many: in a
 #: good design most members share the largest force, and a step that knows nothing of one of them raises it; as long as
 #: their gradients have room, in numbers
-TIED, GROWTH, MOST_ROWS, ROOM = 0.1, 4, 960, 2e7
+TIED, GROWTH, MOST_ROWS, ROOM_FOR_GRADIENTS = 0.1, 4, 960, 2e7
 
 
 class DesignEvaluator(Protocol):
@@ -69,7 +69,7 @@ class DesignProblem:
         self.scalarisation = scalarisation
         one = scalarisation is None and case.uncertainty is None
         #: how many of the highest rows the separable approximation takes; None: as the optimiser's settings say
-        self.competitors: int | None = None if one else ROWS
+        self.competitors: int | None = None if one else MOST_ROWS_OF_U
         active = [0] if scalarisation is None else scalarisation.active
         self._count = len(case.objectives)
         self._places = active
@@ -100,11 +100,11 @@ class DesignProblem:
         self.smooth = case.uncertainty is None and all(map(_is_smooth, self._objectives))
         #: no U is below it
         self.objective_bound = lower_bound_of(self._objectives[0]) if one else -np.inf
-        aims: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
-        members = any(kind_of(each.response).of_members for each in aims)
+        responses: list[ReducedResponse] = [*self._objectives, *(row for _, row in self._responses)]
+        members = any(kind_of(each.response).of_members for each in responses)
         # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
-        cones = len(self.initial) < WIDE
-        few, many = Rows(*NEAR, cones=cones), Rows(*ALL, cones=cones)
+        cones = len(self.initial) < VERY_MANY_VARIABLES
+        few, many = Rows(*PEAKS_OF_RESPONSE, cones=cones), Rows(*PEAKS_OF_MEMBERS, cones=cones)
         #: the peaks that an evaluation is asked for
         self.rows = (many if members else few) if self.competes else USUAL
         #: how many of them the last design needed: the next evaluation begins with these, and tells the same as if not
@@ -194,7 +194,7 @@ class DesignProblem:
         It is begun with as many as the last design needed, since the next one mostly needs as many. What is told is the
         same whatever was evaluated before: where fewer would have been enough, these are asked for.
         """
-        few, room = self.rows.most, min(MOST_ROWS, ROOM / len(self.initial))
+        few, room = self.rows.most, min(MOST_ROWS, ROOM_FOR_GRADIENTS / len(self.initial))
         if not gradient or few is None:
             return self._evaluator.evaluate(design, gradient, rows=self.rows)
 
@@ -367,10 +367,10 @@ def lower_bound_of(objective: Objective) -> float:
     return 0.0 if positive and sign_of(objective) > 0.0 else -np.inf
 
 
-def competes(aim: Objective | ResponseRow, sign: float) -> bool:
+def competes(reduced: ReducedResponse, sign: float) -> bool:
     """Whether every competing peak of an objective or a constraint is a lower bound of sign times its value."""
-    reduction = REDUCTIONS[aim.over_time]
-    if reduction.at_end and kind_of(aim.response).of_members:
+    reduction = REDUCTIONS[reduced.over_time]
+    if reduction.at_end and kind_of(reduced.response).of_members:
         return sign > 0.0  # members compete at the end, too
     return reduction.is_largest if sign > 0.0 else reduction.is_smallest
 

@@ -16,7 +16,7 @@ from mdstopo.case.methods.integrators import ADAPTIVE, AUTO, INTEGRATORS, SMOOTH
 from mdstopo.case.methods.integrators import having as integrators_having
 from mdstopo.case.methods.sensitivities import SENSITIVITIES, chosen
 from mdstopo.case.methods.sensitivities import having as methods_having
-from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
+from mdstopo.case.model import Case, MemberGroup, ReducedResponse, ResponseRow
 from mdstopo.case.scene.candidates import mirrored_groups
 from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import CallOutcome, allowed, side_by_side
@@ -114,7 +114,7 @@ class Evaluator:
         bounded = {i: row for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
         limited = {f"constraints[{i}]": row for i, row in bounded.items()}
         self._limited = dict(zip(bounded, limited, strict=True))
-        self._by_load_case: dict[str, dict[str, Objective | ResponseRow]] = {
+        self._by_load_case: dict[str, dict[str, ReducedResponse]] = {
             name: {o.name: o for o in case.objectives if o.load_case == name}
             | {key: row for key, row in limited.items() if row.load_case == name}
             for name in self.scenes
@@ -150,7 +150,7 @@ class Evaluator:
         notes: list[str] = []
         for scene in self.scenes.values():
             notes += [note for note in scene.skipped if note not in notes]
-        unused = [name for name, aims in self._by_load_case.items() if not aims and self.case.objectives]
+        unused = [name for name, responses in self._by_load_case.items() if not responses and self.case.objectives]
         return notes + [f"load case {name}: nothing looks at it" for name in unused]
 
     @property
@@ -343,8 +343,8 @@ class Evaluator:
         values as of `evaluate`, from the same motion. It is computed once, unless integrals need steps that end
         elsewhere, or values are those of another integrator."""
         trajectory = self.trajectory(alpha, load_case)
-        aims = self._by_load_case[load_case]
-        if not aims or not trajectory.status.ok:
+        responses = self._by_load_case[load_case]
+        if not responses or not trajectory.status.ok:
             return trajectory, MotionValues(trajectory.status, trajectory.message)
         other = self._other_of(self.sensitivity, gradient=False)
         if other is not None:  # values are those of the integrator that gradients have, as of `evaluate`
@@ -356,7 +356,7 @@ class Evaluator:
         status, message = self._verdict(load_case, self.computed(self.design(alpha)), result)
         if not status.usable:
             return trajectory, MotionValues(status, message)
-        peaks = {key: _peaks(result, j, None, None, driver.shapes[j])[0] for j, key in enumerate(aims)}
+        peaks = {key: _peaks(result, j, None, None, driver.shapes[j])[0] for j, key in enumerate(responses)}
         return trajectory, MotionValues(status, message, peaks)
 
     def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
@@ -428,7 +428,9 @@ class Evaluator:
     @cached_property
     def _seen(self) -> list[tuple[str, tuple[str, ...], SceneDriver]]:
         """The load cases that objectives or constraints are of: name, the names of these, driver."""
-        return [(name, tuple(aims), self.driver(name)) for name, aims in self._by_load_case.items() if aims]
+        return [
+            (name, tuple(responses), self.driver(name)) for name, responses in self._by_load_case.items() if responses
+        ]
 
     def _without_slope(self, design: FloatArray, gradient: bool) -> str:
         """Why a gradient that is wanted is not there at this design, or nothing: alpha^mu has no slope at 0 where
@@ -462,7 +464,9 @@ class Evaluator:
     def _held(self, name: str, told: "Callable[[GeneralDriver, FloatArray], str]") -> str:
         """Of the first load case in which steps of an integrator are held short what tells so; else drivers stay."""
         method = method_of(name, self.case.solver)
-        drivers = {load_case: self._made(load_case, method) for load_case, aims in self._by_load_case.items() if aims}
+        drivers = {
+            load_case: self._made(load_case, method) for load_case, responses in self._by_load_case.items() if responses
+        }
         for driver in drivers.values():
             held: str = told(cast("GeneralDriver", driver), self.computed(self._design.take(self.case.start)))
             if held:
@@ -510,9 +514,9 @@ class Evaluator:
 
     def _made(self, name: str, method: Method, fits: bool = True) -> SceneDriver:
         """A driver of one load case by a method; fits: as of `DriverOptions`."""
-        solver, aims = self.case.solver, tuple(self._by_load_case[name].values())
+        solver, responses = self.case.solver, tuple(self._by_load_case[name].values())
         tolerance, step = _of_motion(solver.tolerance), solver.step or 0.0
-        options = DriverOptions(method, tolerance, step, aims, self._design.values, self._background, fits)
+        options = DriverOptions(method, tolerance, step, responses, self._design.values, self._background, fits)
         driver = self._family.driver(self._near, self.scenes[name], options)
         if method.kind.finds_step and solver.step is None:
             from mdstopo.integrators.default_step import default_step

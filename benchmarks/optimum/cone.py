@@ -82,7 +82,7 @@ class Exact:
 def exact(case: Case) -> Exact:
     """The optimum of a driven linkage. Needs cvxpy and CLARABEL. Raises ValueError for what is not affine."""
     motions = {each.name: _Samples(case, each.name) for each in case.load_cases}
-    aims = [motions[each.load_case].forces(each.response, each.over_time) for each in case.objectives]
+    objectives = [motions[each.load_case].forces(each.response, each.over_time) for each in case.objectives]
     rows = [row for row in case.constraints if isinstance(row, ResponseRow)]
     if any(row.sense != "limit" for row in rows):
         raise ValueError("only upper limits keep the set of designs convex")
@@ -90,22 +90,22 @@ def exact(case: Case) -> Exact:
     least = _solve(case, [], limits) if limits else None
     if least is not None and least[1] > 1e-6:
         return Exact(None, float(least[1]), least[0])
-    alpha, value = _solve(case, aims, limits)
+    alpha, value = _solve(case, objectives, limits)
     return Exact(float(value), 0.0, alpha)
 
 
 def _solve(
-    case: Case, aims: Sequence[Sequence[Force]], limits: Sequence[tuple[Sequence[Force], float]]
+    case: Case, objectives: Sequence[Sequence[Force]], limits: Sequence[tuple[Sequence[Force], float]]
 ) -> tuple[Floats, float]:
-    """Design and least value; without aims the least relative excess over the limits, negative where there is room."""
+    """Design and least value; without objectives the least relative excess over the limits, negative below them."""
     alpha = np.clip(case.initial, case.lower, case.upper)
-    forces = [each for group in (*aims, *(group for group, _ in limits)) for each in group]
+    forces = [each for group in (*objectives, *(group for group, _ in limits)) for each in group]
     for force in forces:
         force.times[:] = force.peaks(alpha)[0][:6].tolist()
     for _ in range(ROUNDS):
-        alpha, value, heights, excess = _program(case, aims, limits)
+        alpha, value, heights, excess = _program(case, objectives, limits)
         worst = 0.0
-        for group, bound in [*zip(aims, heights, strict=True)] + [(g, b * (1.0 + excess)) for g, b in limits]:
+        for group, bound in [*zip(objectives, heights, strict=True)] + [(g, b * (1.0 + excess)) for g, b in limits]:
             for force in group:
                 times, values = force.peaks(alpha)
                 over = (values - bound) / abs(bound)
@@ -117,19 +117,23 @@ def _solve(
 
 
 def _program(
-    case: Case, aims: Sequence[Sequence[Force]], limits: Sequence[tuple[Sequence[Force], float]]
+    case: Case, objectives: Sequence[Sequence[Force]], limits: Sequence[tuple[Sequence[Force], float]]
 ) -> tuple[Floats, float, Floats, float]:
     """One cone program: design, value, bound of each objective, relative excess."""
     import cvxpy as cp
 
-    scale = 1.0 if not aims else max(float(f.peaks(np.asarray(case.initial))[1][0]) for group in aims for f in group)
-    x, heights, excess = cp.Variable(case.n_design), cp.Variable(max(len(aims), 1)), cp.Variable()
+    scale = (
+        1.0
+        if not objectives
+        else max(float(f.peaks(np.asarray(case.initial))[1][0]) for group in objectives for f in group)
+    )
+    x, heights, excess = cp.Variable(case.n_design), cp.Variable(max(len(objectives), 1)), cp.Variable()
     rows: list[Any] = [x >= case.lower, x <= case.upper]
     for row in case.constraints:
         if isinstance(row, VolumeRow):
             total = row.coefficients @ x / (row.bound or 1.0)
             rows.append({"limit": total <= 1.0, "at_least": total >= 1.0, "equals": total == 1.0}[row.sense])
-    for k, group in enumerate(aims):
+    for k, group in enumerate(objectives):
         for force in group:
             for constant, slopes in map(force.at, force.times):
                 rows.append(cp.norm(constant / scale + (slopes / scale) @ x) <= heights[k])
@@ -137,14 +141,14 @@ def _program(
         for force in group:
             for constant, slopes in map(force.at, force.times):
                 rows.append(cp.norm(constant / bound + (slopes / bound) @ x) <= 1.0 + excess)
-    if aims:
+    if objectives:
         rows.append(excess == 0.0)
-    program = cp.Problem(cp.Minimize(_combined(cp, case, heights) if aims else excess), rows)
+    program = cp.Problem(cp.Minimize(_combined(cp, case, heights) if objectives else excess), rows)
     program.solve(solver=cp.CLARABEL, tol_gap_abs=1e-10, tol_gap_rel=1e-10, tol_feas=1e-10)
     if program.status not in ("optimal", "optimal_inaccurate"):
         raise ValueError(f"the cone solver ended with {program.status}")
-    value = float(program.value) * (scale if aims else 1.0)
-    solved = np.zeros(0) if not aims else np.asarray(heights.value) * scale
+    value = float(program.value) * (scale if objectives else 1.0)
+    solved = np.zeros(0) if not objectives else np.asarray(heights.value) * scale
     return np.asarray(x.value), value, solved, float(excess.value)
 
 

@@ -24,7 +24,7 @@ from scipy.optimize import linprog
 from benchmarks.forces import whole_forces
 from benchmarks.optimum.measure import slopes_of
 from mdstopo import Case, Evaluation
-from mdstopo.case.model import Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import ReducedResponse, ResponseRow, VolumeRow
 from mdstopo.evaluation import Peak
 from mdstopo.optimizer.problem import LinearRows
 
@@ -111,7 +111,7 @@ def volume_rows(case: Case) -> LinearRows:
     )
 
 
-def _members(case: Case, design: Floats, looked: Objective | ResponseRow, peaks: Sequence[Peak]) -> Sequence[Peak]:
+def _members(case: Case, design: Floats, looked: ReducedResponse, peaks: Sequence[Peak]) -> Sequence[Peak]:
     """A peak for every member of a group in a driven scene; other responses' peaks as they are.
 
     None is higher than the highest that the evaluation found: the residual is that of the function that it computes.
@@ -145,7 +145,7 @@ def _constraints(case: Case, design: Floats, found: Evaluation, driven: bool) ->
     return np.array(c), np.array(c_slopes).reshape(len(c), case.space.size)
 
 
-def competing(looked: Objective | ResponseRow, sign: float, peaks: Sequence[Peak]) -> Sequence[Peak]:
+def competing(looked: ReducedResponse, sign: float, peaks: Sequence[Peak]) -> Sequence[Peak]:
     """The peaks that bound sign times a response over time from above: all of a maximum, else the value."""
     several = looked.over_time in (UPPER if sign > 0.0 else LOWER)
     last = looked.over_time == "final" and looked.response.kind == "member_force" and sign > 0.0

@@ -10,7 +10,7 @@ BYTES_PER_MEMBER = 200
 BYTES_PER_POINT = 100
 SHARE_OF_STEPS = 8
 """The steps of one simulation, all of which are kept, may take one part in this many of the memory."""
-WORTH = 1.05
+LEAST_GROWTH = 1.05
 """Room for steps that would grow by less than this stays as it is."""
 _UNKNOWN = 8 * 2**30
 _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
@@ -39,4 +39,4 @@ def room_factor(floats: int) -> float:
     """By how much the arrays for steps, of so many numbers, grow when they are full: at most twofold; 1 where memory
     ends."""
     factor = min(2.0, most_floats() / floats)
-    return factor if factor >= WORTH else 1.0
+    return factor if factor >= LEAST_GROWTH else 1.0

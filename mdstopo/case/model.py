@@ -40,18 +40,6 @@ from mdstopo.case.laws import (
     SpringLaw,
     TableLaw,
 )
-from mdstopo.case.objects.aims import (
-    Combine,
-    Following,
-    Follows,
-    Objective,
-    OptimizerSettings,
-    Response,
-    ResponseRow,
-    SolverSettings,
-    Variable,
-    VolumeRow,
-)
 from mdstopo.case.objects.design_space import DesignSpace, slots_of, units_of
 from mdstopo.case.objects.fitting import Fit
 from mdstopo.case.objects.parts import (
@@ -69,6 +57,19 @@ from mdstopo.case.objects.parts import (
     PrescribedRotation,
     Surface,
     SurfaceContact,
+)
+from mdstopo.case.objects.problem_parts import (
+    Combine,
+    Following,
+    Follows,
+    Objective,
+    OptimizerSettings,
+    ReducedResponse,
+    Response,
+    ResponseRow,
+    SolverSettings,
+    Variable,
+    VolumeRow,
 )
 from mdstopo.case.objects.uncertain import Uncertainty
 from mdstopo.case.text.errors import Mistake
@@ -120,6 +121,7 @@ __all__ = [
     "PrescribedRotation",
     "PrismaticJoint",
     "PulseLaw",
+    "ReducedResponse",
     "Response",
     "ResponseRow",
     "RevoluteJoint",

@@ -28,7 +28,7 @@ from mdstopo.case.scene.load_case_times import time_spans
 from mdstopo.case.scene.load_cases import build_load_cases
 from mdstopo.case.scene.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.scene.points import build_points
-from mdstopo.case.sections.goals import apply_design, build_combine, build_constraints, build_objectives
+from mdstopo.case.sections.problem_sections import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.sections.settings import build_optimizer, build_solver, warn_assemble
 from mdstopo.case.text.errors import CaseError, Mistake
 from mdstopo.case.text.extending import KEY, CannotExtendError, extended, text_of_tree

@@ -18,11 +18,11 @@ ODD = 100.0
 HEAVY = 1000.0
 #: how near a point has to be to touch, and how far a body moves while another stands that should travel with it, in
 #: the size of the larger of both
-TOUCHING, FAR = 0.02, 5.0
+TOUCHING, MOVED_AWAY = 0.02, 5.0
 #: relative difference up to which two members are as long as each other
 ALIKE = 1e-6
 #: steps that a period has at least, to be seen at all
-FEWEST = 10.0
+STEPS_PER_PERIOD = 10.0
 
 
 def odd_scales(case: Case) -> list[str]:
@@ -65,7 +65,7 @@ def left_behind(case: Case) -> list[str]:
             speeds = [float(np.linalg.norm(starts[name].velocity)) if name in starts else 0.0 for name in names]
             away = max(speeds) * (load_case.end - load_case.start)
             stands = names[int(np.argmin(speeds))]
-            if min(speeds) > 0.0 or not away > FAR * reach > 0.0 or stands in driven or stands == GROUND:
+            if min(speeds) > 0.0 or not away > MOVED_AWAY * reach > 0.0 or stands in driven or stands == GROUND:
                 continue
             moves = names[int(np.argmax(speeds))]
             found.append(
@@ -217,9 +217,9 @@ def long_step(case: Case, modes: Modes, bodies: tuple[str, ...]) -> str:
         return ""
     rate, mover = found
     period = 2.0 * np.pi / rate
-    if period >= FEWEST * step:
+    if period >= STEPS_PER_PERIOD * step:
         return ""
     return (
         f"solver.step of {number(step)} s is {number(period / step, 2)} to a period of the fastest vibration, "
-        f"{number(rate, 4)} rad/s ({mover}); where it matters, take at most {number(period / FEWEST, 2)} s"
+        f"{number(rate, 4)} rad/s ({mover}); where it matters, take at most {number(period / STEPS_PER_PERIOD, 2)} s"
     )

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from mdstopo.report.difference import Designs, Pair
 
 #: keys that are told; more is counted
-MOST = 40
-#: members that only one result has, of which it is told which they are
-FEW = 8
+MOST_KEYS = 40
+#: of members that only one result has, so many are named
+NAMED_MEMBERS = 8
 
 
 @click.command("diff")
@@ -72,9 +72,9 @@ def _say(output: Output, title: str, pairs: "list[Pair]") -> None:
     if not pairs:
         return
     output.say(title)
-    output.table([_row(pair) for pair in pairs[:MOST]])
-    if len(pairs) > MOST:
-        output.say(f"  and {len(pairs) - MOST} more")
+    output.table([_row(pair) for pair in pairs[:MOST_KEYS]])
+    if len(pairs) > MOST_KEYS:
+        output.say(f"  and {len(pairs) - MOST_KEYS} more")
 
 
 def _row(pair: "Pair") -> list[str]:
@@ -115,6 +115,6 @@ def _design_rows(own: "Designs") -> list[list[str]]:
     for title, members in (("only in the first", own.members_first), ("only in the second", own.members_second)):
         if own.only_first or own.only_second:
             rows.append([title, str(len(members))])
-        rows += [["", words] for words in members[:FEW]]
-        rows += [["", f"and {len(members) - FEW} more"]] if len(members) > FEW else []
+        rows += [["", words] for words in members[:NAMED_MEMBERS]]
+        rows += [["", f"and {len(members) - NAMED_MEMBERS} more"]] if len(members) > NAMED_MEMBERS else []
     return rows

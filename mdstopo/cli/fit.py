@@ -169,7 +169,7 @@ def _fitted(
     fitted_before = fitted_place.read_bytes().decode(errors="replace") if fitted_place.exists() else None
     file = FitFile(place, problem, asked.line, fitted_before)
     run = FitRun(problem) if known is None else known
-    saver = Checkpointer(lambda: file.checkpoint(run, output.notice))
+    saver = Checkpointer(lambda: file.checkpoint(run), notify=output.notice)
 
     def save(_run: FitRun, urgent: bool = True) -> None:
         saver.offer(urgent=urgent)

@@ -284,12 +284,12 @@ def _note_other_peaks(
     steps: of the differences.
     """
     from mdstopo.cli.gradient_numbers import changes_peak
-    from mdstopo.design_problem import ALL
+    from mdstopo.design_problem import PEAKS_OF_MEMBERS
     from mdstopo.evaluation import Rows
 
     method, result = next(iter(results.items()))
     off = [name for name, difference in result["differences"].items() if difference > _OFF]
-    found = engine.evaluate(alpha, sensitivity=method, rows=Rows(*ALL)) if off else None
+    found = engine.evaluate(alpha, sensitivity=method, rows=Rows(*PEAKS_OF_MEMBERS)) if off else None
     if found is None or not found.status.usable:
         return
     tied = [name for name in off if changes_peak(found.peaks[name], steps)]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 #: seconds until something is said, and between two lines
 FIRST, EVERY = 5.0, 10.0
 #: seconds by which the rate of steps is told
-SHORT = 0.5
+RATE_OVER = 0.5
 #: how many times as heavy another body is from which on a light one is named
 LIGHT = 1e6
 
@@ -43,7 +43,7 @@ def told_while(
         while not over.wait(wait):
             wait = every
             before, at = steps_done(driver), time.monotonic()
-            if len(before) < 2 or over.wait(SHORT):
+            if len(before) < 2 or over.wait(RATE_OVER):
                 continue
             now = steps_done(driver)
             if now[-1] >= end:

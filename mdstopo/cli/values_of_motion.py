@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from mdstopo.evaluation import MotionValues
 
 #: groups of a volume row from which on a table names the first two
-MANY = 4
+MANY_GROUPS = 4
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def is_kept(row: "VolumeRow | ResponseRow", value: float, tolerance: float) -> b
 
 def group_names(row: "VolumeRow") -> str:
     """The groups of a volume row, of many the first two: a final case has one for each member, and no line for all."""
-    if len(row.groups) <= MANY:
+    if len(row.groups) <= MANY_GROUPS:
         return ", ".join(row.groups)
     return f"{', '.join(row.groups[:2])} and {len(row.groups) - 2} more groups"
 

@@ -20,7 +20,7 @@ from mdstopo.compiler.store import Code, alone, cache_folder, read, read_checked
 SPLIT = "mdstopo.general."
 #: instructions, as written for LLVM, from which on a function is long. LLVM inlines functions of some fifty, when what
 #: can be done away with is gone; so what is called by its symbol instead loses nothing
-LONG = 160
+LONG_FUNCTION = 160
 #: modules of deep calls, whose long functions would else be optimised once more with everyone that calls them
 STAYING = (
     "mdstopo.optimizer.conic_kernels", "mdstopo.optimizer.reduced", "mdstopo.optimizer.cones",
@@ -168,7 +168,7 @@ _MADE: dict[Path, Code] = {}
 
 def is_long(size: int, symbol: str, inlined: bool) -> bool:
     """Whether a function of so many instructions is to have machine code of its own; inlined: its callers hold it."""
-    return size >= LONG and not inlined and symbol.startswith(_OURS)
+    return size >= LONG_FUNCTION and not inlined and symbol.startswith(_OURS)
 
 
 def is_of(symbol: str, modules: Iterable[str]) -> bool:

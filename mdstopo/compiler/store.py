@@ -44,7 +44,7 @@ _MAGIC = b"mdstopo code 4\n"
 #: folders of other sources and versions: how many are kept, and how long after their last use, in seconds
 _KEPT, _LASTING = 12, 30 * 86400.0
 _DAY = 86400.0
-#: how long, in seconds, another process is waited for that compiles the same
+#: seconds to wait for another process that is compiling the same kernel
 _PATIENCE = 600.0
 
 #: a hash of the sources that `include` has added; empty where there are none

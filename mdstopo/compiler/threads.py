@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mdstopo.compiler.kernel import when_compiling
 
 #: threads of one pass at most
-MOST = 64
+MOST_THREADS = 64
 VARIABLE = "MDSTOPO_THREADS"
 
 
@@ -36,9 +36,9 @@ def allowed() -> int:
     """How many threads a pass may take: MDSTOPO_THREADS, else one a core. Raises ThreadsError."""
     asked = os.environ.get(VARIABLE, "")
     if not asked:
-        return min(cores(), MOST)
-    if not (asked.isascii() and asked.isdigit() and 1 <= int(asked) <= MOST):
-        raise ThreadsError(f"MDSTOPO_THREADS is {asked!r}, not a number of threads from 1 to {MOST}")
+        return min(cores(), MOST_THREADS)
+    if not (asked.isascii() and asked.isdigit() and 1 <= int(asked) <= MOST_THREADS):
+        raise ThreadsError(f"MDSTOPO_THREADS is {asked!r}, not a number of threads from 1 to {MOST_THREADS}")
     return int(asked)
 
 

@@ -21,11 +21,11 @@ from mdstopo.general.scene.extent import size_of
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 
 #: the farthest that an equilibrium goes in one step of the sizes: in sizes of the scene, and in rad
-NEAR, TURN = 0.01, 0.05
+LONGEST_MOVE, LONGEST_TURN = 0.01, 0.05
 #: the first step of the sizes, and the shortest one: where even that is too far, there is a jump
-FIRST, SHORTEST = 1.0 / 8.0, 1.0 / 4096.0
+FIRST_STEP, SHORTEST_STEP = 1.0 / 8.0, 1.0 / 4096.0
 #: how far the place of rest may move from that of the full design without a word: in sizes of the scene, and in rad
-FAR, TURNED = 0.05, 0.1
+MOVED_FAR, TURNED_FAR = 0.05, 0.1
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,9 @@ def compare_equilibria(case: Case, design: FloatArray, end: FloatArray, reduced:
         far = _Distance(case, bodies, begun.q, ended.q)
         words = f"{where}the final design rests {far} away from where the full one does"
         tracked = _followed(driver, case, design, end, begun.q)
-        if tracked is None or _Distance(case, bodies, tracked, ended.q).is_beyond(NEAR, TURN):
+        if tracked is None or _Distance(case, bodies, tracked, ended.q).is_beyond(LONGEST_MOVE, LONGEST_TURN):
             return Comparison(f"{words}, at another equilibrium: the members kept do not hold it")
-        if far.is_beyond(FAR, TURNED):
+        if far.is_beyond(MOVED_FAR, TURNED_FAR):
             moved = moved or words
     return Comparison(moved=moved)
 
@@ -95,14 +95,16 @@ def _followed(
     driver: GeneralDriver, case: Case, begin: FloatArray, end: FloatArray, q: FloatArray
 ) -> FloatArray | None:
     """The equilibrium (n,) of the design `end`, followed from that of `begin`, q; None where it jumps or ends."""
-    size, share, step = size_of(case), 0.0, FIRST
+    size, share, step = size_of(case), 0.0, FIRST_STEP
     while share < 1.0:
         step = min(step, 1.0 - share)
         driver.take(begin + (share + step) * (end - begin))
         driver.start_from(q)
         found = settle(driver, driver.alpha.copy(), q, size)
-        if isinstance(found, str) or _Distance(case, driver.scene.kinematics, q, found.q).is_beyond(NEAR, TURN):
-            if step <= SHORTEST:
+        if isinstance(found, str) or _Distance(case, driver.scene.kinematics, q, found.q).is_beyond(
+            LONGEST_MOVE, LONGEST_TURN
+        ):
+            if step <= SHORTEST_STEP:
                 return None
             step /= 4.0
             continue

@@ -41,7 +41,7 @@ TIGHTEST = 1e-13
 """The smallest tolerance of a verification: below it, rounding is larger than the errors that it asks for."""
 WORSE = 0.05
 """An objective that is worse than the full design's by more than this share of it is warned of."""
-FAR = 10.0
+TOLD_AS_FAR = 10.0
 """From this share on the warning says "far" and no percentage: the full design's objective is near zero."""
 
 
@@ -257,7 +257,7 @@ def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...
         before, now = (columns[k].evaluation.objectives[objective.name] for k in (0, -1))
         loss = (before - now if objective.sense == "maximize" else now - before) / abs(before) if before else 0.0
         if loss > WORSE:
-            by = f"{loss:.1%}" if loss < FAR else "far"
+            by = f"{loss:.1%}" if loss < TOLD_AS_FAR else "far"
             told.append(
                 f"{objective.name} of the final design is {by} worse than the full design promised: "
                 f"{now:.6g} in place of {before:.6g}; keep more members"

@@ -103,8 +103,8 @@ class _Lift:
             "members": self.each(self.group),
             "loads": self.each(self.load),
             "load_cases": self.each(self.load_case),
-            "objectives": self.each(self.aim),
-            "constraints": self.each(self.aim),
+            "objectives": self.each(self.reduced_response),
+            "constraints": self.each(self.reduced_response),
         }
 
     def refuse(self, path: str, words: str) -> None:
@@ -332,7 +332,7 @@ class _Lift:
         lifts = {key: self.sections()[key] for key in ("gravity", "loads", "motions")}
         return {key: lifts.get(key, _as_it_is)(value, inside(path, key)) for key, value in (old or {}).items()}
 
-    def aim(self, old: Plain, path: str) -> Plain:
+    def reduced_response(self, old: Plain, path: str) -> Plain:
         """An objective or a constraint."""
         response = old.get("response")
         if not isinstance(response, Mapping):

@@ -89,5 +89,5 @@ def bound_of(row: VolumeRow, n: int, design: FloatArray) -> float:
         return row.bound
     left = row.bound - float(row.prices @ design[n:])
     own = float(row.coefficients @ design[:n])
-    # a row that is used up to rounding stays so: of a small rest that can be more than the rounding of the rest
+    # a row that was met with equality, up to rounding, stays so: beside a small rest that rounding may be large
     return own if abs(own - left) <= ROUNDING * max(abs(row.bound), abs(own)) else left

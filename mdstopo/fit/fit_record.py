@@ -2,7 +2,6 @@
 
 import hashlib
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +15,12 @@ from mdstopo.engine import Evaluator
 from mdstopo.fit.fit_problem import FitProblem
 from mdstopo.fit.prepared import case_at
 from mdstopo.fit.run_fit import FitRun
-from mdstopo.store.contents import Datasets, case_part, design_part, trajectory_part
+from mdstopo.store.contents import Contents, Datasets, case_part, design_part, trajectory_part
 from mdstopo.store.image import Attribute
 from mdstopo.store.json_values import json_value
-from mdstopo.store.provenance import Provenance
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.same_case import describe
-from mdstopo.store.set_keys import set_keys
-from mdstopo.store.store_errors import StoreError, WriteError
+from mdstopo.store.store_errors import StoreError
 from mdstopo.store.writing import write_result
 
 #: the kind of result files of fits
@@ -41,19 +38,19 @@ class FitFile:
 
     def __init__(self, path: Path, problem: FitProblem, command: str = "", fitted_before: str | None = None) -> None:
         self.path = path
-        self._case = problem.case
-        self._provenance = Provenance.collect(command)
-        self._fixed = case_part(problem.case) | design_part(problem.case, problem.case.start)
-        self._fixed |= _digests(problem)
+        case, fit = problem.case, problem.case.fit
+        assert fit is not None
+        fixed = case_part(case) | design_part(case, case.start) | _digests(problem)
+        settings: dict[str, Attribute] = {
+            "loss": fit.loss, "confidence": fit.confidence, "starts": fit.starts, "seed": fit.seed,
+        }  # fmt: skip
+        self._contents = Contents.begun(case, KIND, command, fixed, settings)
         # a fit that is killed has to know the fitted case as one of its own when it goes on
         self._fitted_before: Datasets = {} if fitted_before is None else {"fit/fitted_case": fitted_before}
 
-    def checkpoint(self, run: FitRun, notify: Callable[[str], None]) -> None:
-        """Save in the middle; what keeps it from being saved is told."""
-        try:
-            self._write("running", "running", datasets(run) | self._fitted_before, ())
-        except WriteError as error:
-            notify(f"no checkpoint: {error}")
+    def checkpoint(self, run: FitRun) -> None:
+        """Save in the middle. Raises StoreError."""
+        write_result(self.path, self._contents.now("running", "running", datasets(run) | self._fitted_before))
 
     def conclude(self, run: FitRun, fitted_case: str | None, warnings: tuple[str, ...]) -> None:
         """Save what has come to its end, with the fitted motion. Raises StoreError.
@@ -63,17 +60,7 @@ class FitFile:
         part = datasets(run) | trajectory_part(_motions(run)) | self._fitted_before
         if fitted_case is not None:
             part["fit/fitted_case"] = fitted_case
-        self._write(run.status, run.reason, part, warnings)
-
-    def _write(self, status: str, reason: str, part: Datasets, warnings: tuple[str, ...]) -> None:
-        fit = self._case.fit
-        assert fit is not None
-        settings: dict[str, Attribute] = {
-            "loss": fit.loss, "confidence": fit.confidence, "starts": fit.starts, "seed": fit.seed,
-        }  # fmt: skip
-        settings |= set_keys(self._case)
-        whole = self._fixed | part
-        write_result(self.path, self._case, KIND, status, reason, whole, self._provenance, settings, warnings)
+        write_result(self.path, self._contents.now(run.status, run.reason, part, warnings))
 
 
 def _digests(problem: FitProblem) -> Datasets:

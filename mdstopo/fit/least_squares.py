@@ -21,9 +21,9 @@ COST, STEP, SLOPE = 1e-12, 1e-8, 1e-10
 #: the same of the cost, while deviations are not known well, and how far they change then, relative
 LOOSE, LOOSELY_SETTLED = 1e-5, 1e-3
 #: evaluations of a fit at most
-MOST = 300
+MOST_EVALUATIONS = 300
 #: turns of fit and deviations at most, and how far deviations may still change, relative
-TURNS, SETTLED = 40, 1e-6
+TURNS, DEVIATIONS_SETTLED = 40, 1e-6
 #: a deviation that is estimated is at least this share of the largest value, or of a unit where all are zero
 LEAST_DEVIATION = 1e-12
 #: standard deviations that a value may be off at the start: squares of more are soon too large for numbers
@@ -127,7 +127,7 @@ def fitted(
         # one series alone, or all of equal deviations: the deviation does not change where the minimum is
         alone = len(problem.parts) == 1 and not LOSSES[problem.fit.loss].is_robust
         change = float(np.max(np.abs(deviation / before - 1.0)))
-        if cost == COST and (alone or change < SETTLED):
+        if cost == COST and (alone or change < DEVIATIONS_SETTLED):
             break
         cost = COST if alone or change < LOOSELY_SETTLED else cost
         x = found.x
@@ -207,7 +207,8 @@ def minimum(
             return _at(problem, start, misfit, deviation, "converged", "nothing is free", evaluations)
         found = least_squares(
             residuals, np.clip((start[free] - low) / width, 0.0, 1.0), jacobian, (0.0, 1.0), method="trf",
-            ftol=precision, xtol=STEP, gtol=SLOPE, x_scale="jac", loss=for_scipy(problem.fit.loss), max_nfev=MOST,
+            ftol=precision, xtol=STEP, gtol=SLOPE, x_scale="jac", loss=for_scipy(problem.fit.loss),
+            max_nfev=MOST_EVALUATIONS,
         )  # fmt: skip
     except MotionError as error:
         nan = np.full(problem.count, np.nan)

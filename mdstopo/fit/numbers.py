@@ -30,7 +30,7 @@ DEFINED = "define."
 #: by how much numbers are shifted, relative to their size: for formulas, and for motions
 SHIFT, SHIFT_OF_MOTIONS = 1e-3, 1e-4
 #: the size of a number is at least this share of the way between its bounds
-LEAST = 3e-3
+LEAST_SIZE = 3e-3
 #: by how much parameters of laws may deviate from a linear function of the numbers, relative
 STRAIGHT = 1e-12
 
@@ -64,7 +64,7 @@ class Numbers:
 
     def size(self, i: int, x: FloatArray) -> float:
         """How large number i is, for shifting it."""
-        return float(max(abs(x[i]), LEAST * (self.upper[i] - self.lower[i])))
+        return float(max(abs(x[i]), LEAST_SIZE * (self.upper[i] - self.lower[i])))
 
     def values_at(self, x: FloatArray) -> FloatArray:
         """(L,) the parameters of laws at x (n,)."""

@@ -17,7 +17,7 @@ from mdstopo.fit.least_squares import Minimum, stated_deviations
 from mdstopo.fit.loss_functions import loss
 
 #: singular values below this share of the largest are none
-NOTHING = 1e-6
+NEGLIGIBLE_SINGULAR_VALUE = 1e-6
 #: an estimate takes part in a direction with this share of its way between the bounds, or more
 TAKES_PART = 0.02
 #: an estimate is at a bound that is as near as this share of the way between both
@@ -111,7 +111,7 @@ def _directions(problem: FitProblem, scaled: FloatArray, free: IndexArray) -> tu
     if not len(free):
         return [], np.zeros((0, 0))
     _, values, vectors = np.linalg.svd(scaled, full_matrices=False)
-    unknown = values <= NOTHING * values[0] if values[0] > 0.0 else np.ones(len(values), dtype=bool)
+    unknown = values <= NEGLIGIBLE_SINGULAR_VALUE * values[0] if values[0] > 0.0 else np.ones(len(values), dtype=bool)
     poorly_known = []
     for value, vector, nothing in zip(values[::-1], vectors[::-1], unknown[::-1], strict=True):
         if nothing or value < 1.0:

@@ -14,9 +14,9 @@ from mdstopo.formula.calculus import derivative, is_number, simplified
 from mdstopo.formula.tree import NUMBER, Expression, names_in, parts
 
 #: what differs between members at one time
-APART = frozenset({"x", "xd", "l0"})
+OF_EACH_MEMBER = frozenset({"x", "xd", "l0"})
 #: the highest whole power, and operations of which a polynomial is made
-HIGHEST = 8.0
+HIGHEST_POWER = 8.0
 _PLAIN = frozenset({"+", "-", "*", "neg"})
 
 
@@ -43,7 +43,7 @@ def _part_is_even(part: Expression) -> bool:
     if part.operator == "^" and not _differs(operands[1]):
         exponent = operands[1]
         whole = exponent.operator == NUMBER and exponent.value == round(exponent.value)
-        return 0.0 <= exponent.value <= HIGHEST if whole else _is_linear(operands[0])
+        return 0.0 <= exponent.value <= HIGHEST_POWER if whole else _is_linear(operands[0])
     return False
 
 
@@ -53,8 +53,8 @@ def _margin_is_even(margin: Expression) -> bool:
 
 def _is_linear(root: Expression) -> bool:
     """Whether slopes by what differs between members are the same for all of them."""
-    return not any(_differs(simplified(derivative(root, word))) for word in APART)
+    return not any(_differs(simplified(derivative(root, word))) for word in OF_EACH_MEMBER)
 
 
 def _differs(root: Expression) -> bool:
-    return not APART.isdisjoint(names_in(root))
+    return not OF_EACH_MEMBER.isdisjoint(names_in(root))

@@ -16,7 +16,7 @@ from mdstopo.formula.smooth_modes import bit
 from mdstopo.formula.tree import NAME, NUMBER, Expression, names_in, operation, parts
 
 #: sides that are kept at most, and sides that are evaluated
-MOST, LOOKS = 8, 100
+MOST_SIDES, MOST_TRIED = 8, 100
 
 
 class Idle(NamedTuple):
@@ -49,7 +49,7 @@ def idle_sides(formulas: tuple[Expression, ...], guards: Sequence[tuple[Expressi
     found: list[Idle] = []
     waiting = [(formulas, 0, 0)]
     looks = 0
-    while waiting and looks < LOOKS and len(found) < MOST:
+    while waiting and looks < MOST_TRIED and len(found) < MOST_SIDES:
         looks += 1
         roots, which, sides = waiting.pop()
         try:

@@ -43,7 +43,7 @@ MOST_OPERATIONS = 20_000
 #: stands for the smallest margin where no switch is evaluated
 NO_MARGIN = number(1e300)
 #: slopes below the one count as zero, those above the other as infinite
-NOUGHT, LARGE = number(1e-300), number(1e100)
+ZERO_SLOPE, INFINITE_SLOPE = number(1e-300), number(1e100)
 #: functions that have no value for some operands; for powers and quotients the second operand decides (`_may_fail`)
 PARTIAL = ("sqrt", "powlog", "log", "asin", "acos")
 
@@ -191,7 +191,7 @@ def _near(margin: Expression) -> Expression:
     size = ZERO
     for slope in slopes:
         size = add(size, call("abs", slope))
-    return choose(operation("<", size, LARGE), call("max", size, NOUGHT), ONE)
+    return choose(operation("<", size, INFINITE_SLOPE), call("max", size, ZERO_SLOPE), ONE)
 
 
 def lowest_of(margins: list[Expression], switches: tuple[Switch, ...]) -> Expression:

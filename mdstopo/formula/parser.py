@@ -20,11 +20,11 @@ from typing import NamedTuple
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.tree import COMPARISONS, FUNCTIONS, Expression, name, number, operation
 
-LONGEST = 5000
+MOST_CHARACTERS = 5000
 """Characters of a formula."""
-DEEPEST = 50
+DEEPEST_NESTING = 50
 """Brackets, signs and powers inside each other."""
-MOST = 1000
+MOST_PARTS = 1000
 """Numbers, names, operators and functions of a formula."""
 
 CONSTANTS = {"pi": math.pi}
@@ -80,8 +80,8 @@ def reserved(word: str) -> bool:
 
 
 def _tokens(text: str) -> list[Token]:
-    if len(text) > LONGEST:
-        raise FormulaError(f"found {len(text):,} characters, allowed are {LONGEST:,}", LONGEST + 1)
+    if len(text) > MOST_CHARACTERS:
+        raise FormulaError(f"found {len(text):,} characters, allowed are {MOST_CHARACTERS:,}", MOST_CHARACTERS + 1)
     tokens: list[Token] = []
     position = 0
     while position < len(text):
@@ -96,8 +96,8 @@ def _tokens(text: str) -> list[Token]:
             raise FormulaError(f"found {match[0]!r}: {_INSTEAD[match[0]]}", column)
         if kind == "blank":
             continue
-        if len(tokens) >= 2 * MOST:
-            raise FormulaError(f"found more than {MOST:,} numbers, names and operators", column)
+        if len(tokens) >= 2 * MOST_PARTS:
+            raise FormulaError(f"found more than {MOST_PARTS:,} numbers, names and operators", column)
         tokens.append(Token(kind, match[0], column))
     tokens.append(Token("end", _END, len(text.rstrip()) + 1))
     return tokens
@@ -247,8 +247,8 @@ class _Parser:
     def deeper(self, token: Token) -> None:
         """One level further in."""
         self.depth += 1
-        if self.depth > DEEPEST:
-            raise FormulaError(f"nested deeper than {DEEPEST} levels", token.column)
+        if self.depth > DEEPEST_NESTING:
+            raise FormulaError(f"nested deeper than {DEEPEST_NESTING} levels", token.column)
 
     def made(self, token: Token, operator: str, *operands: Expression) -> Expression:
         """An operation that stands at a token."""
@@ -257,8 +257,8 @@ class _Parser:
     def kept(self, token: Token, part: Expression) -> Expression:
         """A part, with its column; not too many."""
         self.count += 1
-        if self.count > MOST:
-            raise FormulaError(f"found more than {MOST:,} numbers, names and operators", token.column)
+        if self.count > MOST_PARTS:
+            raise FormulaError(f"found more than {MOST_PARTS:,} numbers, names and operators", token.column)
         self.columns.setdefault(part, token.column)
         return part
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-#: points of one front
-MOST = 100_000
+#: points of one front at most
+MOST_POINTS = 100_000
 
 
 def parse_range(text: str) -> list[float]:
@@ -37,8 +37,8 @@ def _spaced(first: float, last: float, step: float) -> list[float]:
     if not (step != 0.0 and (last - first) / step > 0.0):
         raise ValueError("the step must be positive and lead from the first number to the last")
     count = (last - first) / step
-    if count > MOST:
-        raise ValueError(f"a step of {step:g} makes more than {MOST} points")
+    if count > MOST_POINTS:
+        raise ValueError(f"a step of {step:g} makes more than {MOST_POINTS} points")
     if abs(count - round(count)) > 1e-6:
         raise ValueError(f"the step {step:g} does not divide the range {first:g} to {last:g}")
     return [float(x) for x in np.linspace(first, last, round(count) + 1)]

@@ -120,7 +120,17 @@ def run_trial(trial: Trial, stop: Callable[[], bool] | None = None) -> Found:
     assert state is not None
     x = packed(outcome.case, state.best_alpha) if outcome.case.priced_groups else state.best_alpha
     return Found(
-        0, trial.key, x, objectives, float(state.best_objective), outcome.status, outcome.reason,
-        outcome.evaluations, float(state.kkt), float(state.best_violation),
-        np.array(outcome.history["objectives"], dtype=np.float64), time.perf_counter() - began, platform.node(),
-    )  # fmt: skip
+        point=0,
+        key=trial.key,
+        alpha=x,
+        objectives=objectives,
+        combined=float(state.best_objective),
+        status=outcome.status,
+        reason=outcome.reason,
+        evaluations=outcome.evaluations,
+        kkt=float(state.kkt),
+        violation=float(state.best_violation),
+        visited=np.array(outcome.history["objectives"], dtype=np.float64),
+        seconds=time.perf_counter() - began,
+        host=platform.node(),
+    )

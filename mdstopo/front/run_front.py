@@ -35,12 +35,9 @@ from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers
 from mdstopo.store.checkpoint import INTERVAL, Checkpointer
-from mdstopo.store.contents import Datasets, case_part
+from mdstopo.store.contents import Contents, case_part
 from mdstopo.store.lock import Lock
-from mdstopo.store.provenance import Provenance
 from mdstopo.store.same_case import describe
-from mdstopo.store.set_keys import set_keys
-from mdstopo.store.store_errors import WriteError
 from mdstopo.store.writing import write_result
 from mdstopo.workers.worker_pool import Lost, StoppedError
 
@@ -48,7 +45,7 @@ Floats = NDArray[np.float64]
 Stop = Callable[[], bool]
 
 #: seconds of work from which on other processes are worth their start
-WORTH = 6.0
+WORTH_PROCESSES = 6.0
 #: tasks that a point takes, and evaluations of a task, about: for guesses of the time that is left
 TASKS, EVALUATIONS = 3.2, 11.0
 #: iterations of the first task that are tried, and thrown away, to see how long the work takes
@@ -118,7 +115,7 @@ def run_front(
     stop_requested: Stop | None = None,
     notify: Callable[[str], None] | None = None,
     command: str = "",
-    worth: float = WORTH,
+    worth: float = WORTH_PROCESSES,
 ) -> FrontOutcome:
     """Compute a front and keep its result file up to date.
 
@@ -220,7 +217,10 @@ class _FrontRun:
         self.open(path)
         self.setting = Setting(self.case, front_key(self.case))
         self.workers, self.cluster, self.worth = workers, cluster, worth
-        self.saver = Checkpointer(lambda: self.checkpoint(path)) if path is not None else None
+        self.saver = None
+        if path is not None:
+            save = partial(self.save, path, RunStatus.RUNNING, "running", None)
+            self.saver = Checkpointer(save, notify=self.notify)
         front, status, reason = None, RunStatus.INTERRUPTED, "stopped on request; what is finished is saved"
         try:
             front = self.work()
@@ -384,10 +384,8 @@ class _FrontRun:
         """Collect what every write repeats."""
         if path is None:
             return
-        self.fixed: Datasets = case_part(self.case)
-        self.provenance = Provenance.collect(self.command)
         chosen = self.case.optimizer
-        self.settings: dict[str, str | int | float | bool] = {
+        settings: dict[str, str | int | float | bool] = {
             "method": self.method,
             "solver_tolerance": self.case.solver.tolerance,
             "preset": chosen.preset,
@@ -396,20 +394,13 @@ class _FrontRun:
             "starts": self.ask.starts,
             "seed": chosen.seed,
         }
-        self.settings |= set_keys(self.case)
-
-    def checkpoint(self, path: Path) -> None:
-        """Save in the middle; a full disk then is no reason to lose the front."""
-        try:
-            self.save(path, RunStatus.RUNNING, "running", None)
-        except WriteError as error:
-            self.notify(f"no checkpoint: {error}")
+        self.contents = Contents.begun(self.case, "pareto", self.command, case_part(self.case), settings)
 
     def save(self, path: Path, status: RunStatus, reason: str, front: Front | None) -> None:
         """Write the file as a whole. In the middle it holds all that is solved, in the end what the plan has taken."""
         tasks = (self.solved if front is None else self.taken).values()
-        datasets = self.fixed | tasks_part(tasks, self.case)
-        settings = dict(self.settings)
+        datasets = tasks_part(tasks, self.case)
+        settings = dict(self.contents.settings)
         case, told = self.as_built(self.so_far() if front is None else front)
         datasets |= front_part(case, self.ask.directions, told, tasks)
         if case.priced_groups:
@@ -420,7 +411,8 @@ class _FrontRun:
             assert self.quality is not None
             settings |= self.quality.numbers()
             datasets |= {"pareto/ideal": self.quality.ideal, "pareto/nadir": self.quality.nadir}
-        write_result(path, case, "pareto", status.value, reason, datasets, self.provenance, settings, self.warnings)
+        contents = replace(self.contents, case=case, settings=settings)
+        write_result(path, contents.now(status.value, reason, datasets, self.warnings))
 
     def as_built(self, front: Front) -> tuple[Case, Front]:
         """The case with all members that designs of a front have, where candidates are priced, and these designs as

@@ -14,10 +14,10 @@ from mdstopo.case.scene.candidates import pairs_of
 from mdstopo.case.text.errors import CaseError
 from mdstopo.compiler.threads import cores
 from mdstopo.front.cluster import Cluster
-from mdstopo.front.directions import MOST, parse_range
+from mdstopo.front.directions import MOST_POINTS, parse_range
 from mdstopo.front.jobs import Setting, Trial, first
 from mdstopo.front.pool import Here, Pool, Processes
-from mdstopo.front.run_front import WORTH, Snapshot
+from mdstopo.front.run_front import WORTH_PROCESSES, Snapshot
 from mdstopo.plan.priced_designs import in_case, with_all
 from mdstopo.plan.solve_task import Found, case_key, failed
 from mdstopo.plan.stored_tasks import read_tasks, tasks_part
@@ -28,11 +28,8 @@ from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers
 from mdstopo.store.checkpoint import INTERVAL, Checkpointer
-from mdstopo.store.contents import Datasets, case_part
+from mdstopo.store.contents import Contents, Datasets, case_part
 from mdstopo.store.lock import Lock
-from mdstopo.store.provenance import Provenance
-from mdstopo.store.set_keys import set_keys
-from mdstopo.store.store_errors import WriteError
 from mdstopo.store.writing import write_result
 from mdstopo.workers.worker_pool import Lost
 
@@ -63,8 +60,8 @@ def combinations(sets: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
         if "" in columns[-1]:
             raise ValueError(f"{key}: found {text!r}; a value is missing")
     count = int(np.prod([len(column) for column in columns]))
-    if count > MOST:
-        raise ValueError(f"{count} combinations are more than {MOST}")
+    if count > MOST_POINTS:
+        raise ValueError(f"{count} combinations are more than {MOST_POINTS}")
     return tuple(product(*columns))
 
 
@@ -82,7 +79,7 @@ def run_sweep(
     stop_requested: Callable[[], bool] | None = None,
     notify: Callable[[str], None] | None = None,
     command: str = "",
-    worth: float = WORTH,
+    worth: float = WORTH_PROCESSES,
 ) -> SweepOutcome:
     """Run a case with every combination of values of some keys, and keep the result file up to date.
 
@@ -123,7 +120,8 @@ def run_sweep(
         wanted = cores() if workers is None else workers
         pools = _Pools(Setting(base, case_key(base)), stop_requested or never, wanted, cluster, worth, tell)
         try:
-            sweep.solve(pools, Checkpointer(lambda: sweep.checkpoint(place, tell)), on_progress or ignore)
+            saver = Checkpointer(lambda: sweep.save(place, RunStatus.RUNNING, "running"), notify=tell)
+            sweep.solve(pools, saver, on_progress or ignore)
         except Exception as error:  # what is finished is worth keeping, whatever it is that cannot go on
             sweep.save(place, RunStatus.INTERRUPTED, str(error) or type(error).__name__)
             raise
@@ -192,8 +190,7 @@ class _Sweep:
         self.runs = [case_key(case) for case in cases]
         self.cases = cases
         self.solved: dict[str, Found] = {}
-        self.fixed: Datasets = case_part(base)
-        self.provenance = Provenance.collect(command)
+        self.contents = Contents.begun(base, "sweep", command, case_part(base))
         self.warnings: tuple[str, ...] = ()
 
     def due(self) -> list[int]:
@@ -252,13 +249,6 @@ class _Sweep:
             len(done), sum(each.evaluations for each in done.values()), mean * (len(self.runs) - len(done)),
         )  # fmt: skip
 
-    def checkpoint(self, path: Path, notify: Callable[[str], None]) -> None:
-        """Save in the middle."""
-        try:
-            self.save(path, RunStatus.RUNNING, "running")
-        except WriteError as error:
-            notify(f"no checkpoint: {error}")
-
     def save(self, path: Path, status: RunStatus, reason: str) -> None:
         """Write the file as a whole."""
         done = [self.solved.get(key) for key in self.runs]
@@ -287,10 +277,9 @@ class _Sweep:
                 design = space.expand(x)
                 part[f"alpha/{i}"] = design[: space.n_alpha]
                 part |= {f"variables/{i}/{name}": values for name, values in space.named(design).items()}
-        datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
+        datasets: Datasets = {f"sweep/{name}": value for name, value in part.items()}
         datasets |= tasks_part(tasks, self.base, "sweep/tasks")
-        settings = set_keys(self.base)
-        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, settings, self.warnings)
+        write_result(path, self.contents.now(status.value, reason, datasets, self.warnings))
 
 
 def shortest(value: float) -> str:

@@ -95,7 +95,10 @@ class DriverWithRun(Protocol):
 
 
 class DriverWithStart(DriverWithRun, Protocol):
-    """A driver whose motion may start somewhere else. alpha (N,), values (P,): of the design that was last taken."""
+    """A driver whose motion can be started from other coordinates than the case's.
+
+    alpha (N,), values (P,): the design that was last taken.
+    """
 
     @property
     def alpha(self) -> FloatArray: ...

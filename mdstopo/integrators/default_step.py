@@ -15,13 +15,13 @@ from mdstopo.scene.springs_model import FloatArray
 from mdstopo.status import Status
 
 #: error aimed at, in tolerances: the promise is ten, and other designs than the measured one are less kind
-AIM = 2.0
+AIMED_ERROR = 2.0
 #: ratio of successive differences between which halving is taken to have settled; four at second order
 SETTLED = 2.7, 6.0
 #: halvings before a scene counts as one that does not settle
 HALVINGS = 12
 #: steps of the first try
-FEWEST = 16
+FIRST_STEPS = 16
 
 
 @dataclass(frozen=True)
@@ -36,15 +36,15 @@ class _Run:
 
 
 def default_step(driver: SceneDriver, alpha: FloatArray) -> float:
-    """What to put into `driver.settings[2]` so that errors are about `AIM` tolerances (settings[0]) at alpha (N,).
+    """What to put into `driver.settings[2]` for errors of about `AIMED_ERROR` tolerances (settings[0]) at alpha (N,).
 
     Negative: radians of the fastest vibration a step (`springs_generalized_alpha.longest_step`). The error meant is
     that of the objectives and of the largest entry of their gradients, relative; without objectives that of the motion.
     """
     times = driver.scene.model.times
     span = float(times[-1] - times[0])
-    step = min(span / FEWEST, float(np.max(np.diff(times))))
-    found = _settle(lambda h: _run(driver, alpha, h), step, AIM * float(driver.settings[0]))
+    step = min(span / FIRST_STEPS, float(np.max(np.diff(times))))
+    found = _settle(lambda h: _run(driver, alpha, h), step, AIMED_ERROR * float(driver.settings[0]))
     rate = driver.rate_at_start()
     return -found * rate if rate * span > 1.0 else found
 

@@ -14,7 +14,7 @@ import numpy as np
 from mdstopo.case.memory import room_factor
 from mdstopo.compiler.fields import aligned
 from mdstopo.evaluation import USUAL, Rows, Shape
-from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, quadrature_breakpoints
+from mdstopo.integrators.integrands import MOST_HALVINGS, PATIENCE, VAIN, quadrature_breakpoints
 from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, Q, V, carve, room_for, status_of
 from mdstopo.mechanics.active_members import ROOMY
@@ -176,7 +176,7 @@ class Driver:
         """The run that was `found`, or one whose steps are short enough for the integral of the energy, too."""
         more, first, left = quadrature_breakpoints(self, found[1])
         times, total, plain = list[float](), first, found
-        for lap in range(ROUNDS):
+        for lap in range(MOST_HALVINGS):
             if not more or found[0] != OK:
                 break
             times += more

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from mdstopo.integrators.driver import Driver
 
 #: how often a motion is computed anew: each time steps are halved
-ROUNDS = 8
+MOST_HALVINGS = 8
 #: from this round on steps are halved no more where that leaves more than so much of what it was: the rest is rounding
 PATIENCE, VAIN = 2, 0.7
 #: what a step may leave by its terms, relative to the tolerance and the whole integral. In truth it leaves some hundred
 #: times less: of 60 random scenes one or two have such a step, in vain. So what changes the integral by less than the
 #: tolerance is not taken
-SHARE = 10.0
+LEFT_BY_STEP = 10.0
 
 
 def quadrature_breakpoints(driver: "Driver", count: int) -> tuple[list[float], float, float]:
@@ -50,7 +50,7 @@ def quadrature_breakpoints(driver: "Driver", count: int) -> tuple[list[float], f
         largest, last = float(sizes.max()), float(sizes[-2:].max())
         if largest > 0.0:
             left[w] = width[w] * largest * (last / largest) ** (order / (len(sizes) - 1))
-    bad = left > SHARE * float(driver.settings[0]) * abs(whole)
+    bad = left > LEFT_BY_STEP * float(driver.settings[0]) * abs(whole)
     return (t[:count] + 0.5 * width)[bad].tolist(), float(whole), float(left.sum())
 
 

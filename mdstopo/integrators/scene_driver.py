@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from mdstopo.case.methods.integrators import IntegratorKind
-from mdstopo.case.model import LoadCase, Objective, ResponseRow
+from mdstopo.case.model import LoadCase, ReducedResponse
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray, IndexArray
@@ -187,7 +187,7 @@ class DriverOptions:
     """What a driver is made for, beside its scene.
 
     method: the integrator. tolerance: relative error that objectives and gradients may have. step: fixed step (s); 0:
-    adaptive steps; negative: see `springs_generalized_alpha.longest_step`. aims: the responses, those of objectives
+    adaptive steps; negative: see `springs_generalized_alpha.longest_step`. responses: reduced ones, those of objectives
     first. design (N + P,): the array that every design is put in, shared with whoever gives designs. background:
     another process that may be compiling what evaluates responses. fits: whether joints are to fit at the start, which
     a kernel finds out.
@@ -196,7 +196,7 @@ class DriverOptions:
     method: Method
     tolerance: float
     step: float
-    aims: Sequence[Objective | ResponseRow]
+    responses: Sequence[ReducedResponse]
     design: FloatArray
     background: Compiling | None = None
     fits: bool = True

@@ -71,11 +71,11 @@ GaussSteps = namedtuple("GaussSteps", FIELDS)  # type: ignore[misc]
 TAG = (0,)
 
 COUNTS = LEVELS
-MOST = max(LEVELS)
+MOST_NODES = max(LEVELS)
 #: level of every first pass, and of all passes of a fixed step: seven nodes, order 14
 FIRST_LEVEL = 0
 #: radians of the fastest vibration that the first window may span, so that the iterations contract
-LONGEST = 6.0
+FIRST_WINDOW_SPAN = 6.0
 #: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
 SLOW = 0.26
 MOST_CAUTIOUS = 100.0
@@ -111,16 +111,16 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     turning = model.load_body.shape[0] > 0
     steps = GaussSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
     own = Room(
-        np.empty(MOST),
-        np.empty((MOST, n_pair, POSE)),
-        np.empty((MOST, n_pair, SUMS)),
-        np.empty((MOST, n_pair, 6, 6)),
-        np.empty((MOST if damped else 1, n_pair, 6, 6)),
-        np.zeros((MOST if turning else 1, n)),
-        make_rows((2 if damped else 1) * MOST * dense_rows(n), n).reshape(
-            (2 if damped else 1, MOST, dense_rows(n), row_width(n))
+        np.empty(MOST_NODES),
+        np.empty((MOST_NODES, n_pair, POSE)),
+        np.empty((MOST_NODES, n_pair, SUMS)),
+        np.empty((MOST_NODES, n_pair, 6, 6)),
+        np.empty((MOST_NODES if damped else 1, n_pair, 6, 6)),
+        np.zeros((MOST_NODES if turning else 1, n)),
+        make_rows((2 if damped else 1) * MOST_NODES * dense_rows(n), n).reshape(
+            (2 if damped else 1, MOST_NODES, dense_rows(n), row_width(n))
         ),
-        make_rows(np.int64(10 * MOST), n).reshape((10, MOST, row_width(n))),
+        make_rows(np.int64(10 * MOST_NODES), n).reshape((10, MOST_NODES, row_width(n))),
         make_rows(np.int64(11), n),
         np.zeros(n_pair),
         np.empty(n_pair),
@@ -226,7 +226,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
     rate = fastest_rate(pair, inv_mass, k, c, damped, ABOUT)
     last_time = times[times.shape[0] - 1]
     span = last_time - t
-    wanted = span if rate * span <= LONGEST else LONGEST / rate
+    wanted = span if rate * span <= FIRST_WINDOW_SPAN else FIRST_WINDOW_SPAN / rate
     if fixed_step > 0.0:
         wanted = fixed_step
     keep_state(steps.t, steps.state, np.int64(0), t, q0, v0)

@@ -56,11 +56,11 @@ AlphaSteps = namedtuple("AlphaSteps", FIELDS)  # type: ignore[misc]
 TAG = (0, 0, 0)
 
 #: steps that an automatic choice takes at least
-FEWEST = 16
+FEWEST_STEPS = 16
 #: radians of the fastest vibration a step up to which the start looks for the slope of the acceleration
 RESOLVED = 2.0
 #: Newton corrections before the extrapolated start is given up, and before the step is
-RESTART, MOST = 8, 30
+RESTART, MOST_CORRECTIONS = 8, 30
 
 
 @kernel
@@ -272,7 +272,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                         rounding = max(rounding, 100.0 * lost / scale[p])
                     accepted = e <= newton_tolerance or (e >= 0.5 * previous and e < rounding)
                     previous = e
-                    if not accepted and (newton >= MOST or (newton >= RESTART and not e < np.inf)):
+                    if not accepted and (newton >= MOST_CORRECTIONS or (newton >= RESTART and not e < np.inf)):
                         return (NEWTON_FAILED if e < np.inf else NON_FINITE), count
                     if not accepted and not e < np.inf:
                         newton = RESTART - 1
@@ -352,5 +352,5 @@ def longest_step(model, strength, damped, wanted):
     if wanted > 0.0:
         return wanted
     rate = rate_at_start(model, strength, damped)
-    longest = (model.times[model.times.shape[0] - 1] - model.times[0]) / FEWEST
+    longest = (model.times[model.times.shape[0] - 1] - model.times[0]) / FEWEST_STEPS
     return min(-wanted / rate, longest) if rate > 0.0 else longest

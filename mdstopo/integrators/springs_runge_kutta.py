@@ -55,10 +55,10 @@ from mdstopo.scene.springs_model import DESIGN, PAIR, SCALED_STIFFNESS, START, S
 RungeKuttaSteps = namedtuple("RungeKuttaSteps", FIELDS)  # type: ignore[misc]
 TAG = (0, 0)
 
-MOST = max(STAGES)
+MOST_STAGES = max(STAGES)
 #: error of a step relative to the tolerance of the motion: the errors of many steps add up, and a gradient's error is
 #: larger than the motion's (over 200 random scenes at most 17 times; a tenth costs about 15 % more steps)
-MARGIN = 0.1
+ERROR_SHARE = 0.1
 
 
 @kernel
@@ -211,7 +211,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)
     model, strength, _ = active_members(whole, strength, np.bool_(True))
-    tolerance = MARGIN * settings[0]
+    tolerance = ERROR_SHARE * settings[0]
     fixed_step = settings[2]
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
@@ -230,9 +230,9 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     k = np.empty((1, n_pair, 6, 6))
     c = np.empty((1, n_pair, 6, 6))
     turn = np.zeros((1, n))
-    q = np.empty((MOST, n))
-    v = np.empty((MOST, n))
-    a = np.empty((MOST, n))
+    q = np.empty((MOST_STAGES, n))
+    v = np.empty((MOST_STAGES, n))
+    a = np.empty((MOST_STAGES, n))
     ends = np.empty((2, n))
     weight = np.empty(n)
     q0 = np.empty(n)

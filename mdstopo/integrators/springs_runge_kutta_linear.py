@@ -4,7 +4,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.runge_kutta_tables import STAGES, B
-from mdstopo.integrators.springs_runge_kutta import MOST, TAG, RungeKuttaSteps, advance
+from mdstopo.integrators.springs_runge_kutta import MOST_STAGES, TAG, RungeKuttaSteps, advance
 from mdstopo.integrators.steps import ENERGY, ENERGY_RATE, FIRST, PARENT, REVERSE, SEGMENT, TIME
 from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
@@ -45,7 +45,7 @@ def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, wo
         model, tables[method], s, strength, steps.index[k, SEGMENT], steps.t[k], h, steps.state[k, 0],
         steps.state[k, 1], keep, damped, o if keep else -1, np.empty((1, n_pair, POSE)), np.empty((1, n_pair, SUMS)),
         np.empty((1, n)), np.empty((1, n_pair, 6, 6)), np.empty((1, n_pair, 6, 6)), np.zeros((1, n)),
-        np.empty((MOST, n)), np.empty((MOST, n)), np.empty((MOST, n)), steps, ends, work,
+        np.empty((MOST_STAGES, n)), np.empty((MOST_STAGES, n)), np.empty((MOST_STAGES, n)), steps, ends, work,
     )  # fmt: skip
     for d in range(n):
         q[d] = ends[0, d]

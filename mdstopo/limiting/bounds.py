@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mdstopo.case.model import Case
-from mdstopo.case.objects.aims import Objective
+from mdstopo.case.objects.problem_parts import Objective
 from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.responses.response_units import unit_of_value, words
 from mdstopo.limiting.force_limits import restrictions

@@ -38,13 +38,13 @@ from mdstopo.limiting.solve_linear_program import (
 from mdstopo.limiting.system import System
 
 #: cells at first and at most, along a line and in the plane, where there are many more rows
-FIRST, MOST = {1: 64, 2: 32}, {1: 400, 2: 150}
+FIRST_CELLS, MOST_CELLS = {1: 64, 2: 32}, {1: 400, 2: 150}
 #: refinements without gain after which it ends
 PATIENCE = {1: 3, 2: 2}
 #: what a refinement has to gain, relative
 GAIN = 2e-4
 #: rounds of tangents for one grid
-ROUNDS = 12
+TANGENT_ROUNDS = 12
 
 
 class ImpossibleError(Exception):
@@ -103,7 +103,9 @@ class Program:
     def _refine(self, elastic: bool) -> float:
         """Solve on finer and finer cells until nothing is gained; the best of all bounds."""
         span, plane = self.times[-1] - self.times[0], min(self.k, 2)
-        grid = np.unique(np.concatenate([np.linspace(self.times[0], self.times[-1], FIRST[plane] + 1), self.times]))
+        grid = np.unique(
+            np.concatenate([np.linspace(self.times[0], self.times[-1], FIRST_CELLS[plane] + 1), self.times])
+        )
         grid = grid[np.append(True, np.diff(grid) > 1e-9 * span)]
         best, still = -math.inf, 0
         tangents: tuple[Tangent, ...] = ()
@@ -114,7 +116,7 @@ class Program:
             if best == -math.inf or (elastic and best > 1e-3):
                 return best
             still = still + 1 if gain <= GAIN * max(abs(best), 1e-9) else 0
-            if still == PATIENCE[plane] or not found.split.any() or len(grid) >= MOST[plane]:
+            if still == PATIENCE[plane] or not found.split.any() or len(grid) >= MOST_CELLS[plane]:
                 return best
             grid = np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])[found.split]]))
 
@@ -123,7 +125,7 @@ class Program:
     ) -> tuple[Solution, tuple[Tangent, ...]]:
         """Solve, and again with the tangents that the solution lacks; the last solution has the best bound."""
         best, still = -math.inf, 0
-        for _ in range(ROUNDS):
+        for _ in range(TANGENT_ROUNDS):
             found = Solve(self, grid, tangents, elastic).solution()
             still = still + 1 if found.bound - best <= 0.1 * GAIN * max(abs(best), 1e-9) else 0
             best = found.bound

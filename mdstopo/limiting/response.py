@@ -9,7 +9,7 @@ import numpy as np
 
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import GROUND
-from mdstopo.case.objects.aims import Objective, Response, ResponseRow
+from mdstopo.case.objects.problem_parts import Objective, Response, ResponseRow
 from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.case.responses.response_units import words
 from mdstopo.limiting.known import Cubics, Floats

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 #: what a norm may exceed its circle by, relative
 TANGENT = 3e-4
 #: new tangents of a row in one round, and how far their directions are apart at least, rad
-NEW, APART = 4, 0.01
+NEW_TANGENTS, TANGENTS_APART = 4, 0.01
 #: directions of a polygon at first
 CORNERS = 16
 #: the range of a variable, in sizes of the largest value of its kind in the solution, that residuals are taken times
@@ -259,9 +259,9 @@ class Solve:
             angles = np.arctan2(y[:, 1], y[:, 0])
             chosen: list[float] = []
             for place in np.argsort(-over * weights[index], kind="stable"):
-                if over[place] <= TANGENT * max(radius, 1e-9) or len(chosen) == NEW:
+                if over[place] <= TANGENT * max(radius, 1e-9) or len(chosen) == NEW_TANGENTS:
                     break
-                if all(abs(math.remainder(angles[place] - other, 2.0 * math.pi)) > APART for other in chosen):
+                if all(abs(math.remainder(angles[place] - other, 2.0 * math.pi)) > TANGENTS_APART for other in chosen):
                     chosen.append(float(angles[place]))
             found += [Tangent(index, (math.cos(angle), math.sin(angle))) for angle in chosen]
         return tuple(found)

@@ -22,7 +22,7 @@ CONTACT = 11
 K, C, MU, SLIP, PX, PY, AX, AY, TX, TY, LENGTH = range(CONTACT)
 ABOVE, CLOSED, CLIPPED, BESIDE = range(4)
 #: a height this near to the edge, relative to 1 m, is at the switch: rates decide
-NEAR = 1e-12
+AT_SWITCH = 1e-12
 #: rates below this are rest (m/s): they decide nothing, as rounding alone moves bodies so fast
 REST = 1e-10
 
@@ -170,7 +170,7 @@ def contact_next(c, height, rise, second, room, mode):
     """
     on_edge = room >= 0.0
     # what rests beside the edge is on the side where it is: the second rate is that of the mode which it has left
-    near = NEAR if abs(rise) > REST else 0.0
+    near = AT_SWITCH if abs(rise) > REST else 0.0
     if mode == BESIDE:
         return ABOVE
     if mode == ABOVE:
@@ -193,11 +193,11 @@ def contact_next(c, height, rise, second, room, mode):
 @inline
 def contact_start(c, height, rise, second, room):
     """The mode at the start; what is inside the edge then is in contact, what rests at it has reached it."""
-    if height > NEAR:
+    if height > AT_SWITCH:
         return ABOVE
     if room < 0.0:
         return ABOVE if height >= 0.0 else BESIDE
-    if height >= -NEAR:
+    if height >= -AT_SWITCH:
         ahead = rise if rise != 0.0 else second
         return _touching(c, max(-height, 0.0), rise) if ahead <= 0.0 else ABOVE
     return _touching(c, -height, rise)

@@ -58,7 +58,7 @@ SUMS = 22
 SUM_X, SUM_Y, SUM_T, STORED, SLOPE_X, SLOPE_Y, SLOPE_T, K_XX = range(8)
 K_YY = 11
 #: members times poses from which on threads are worth making: some 0.8 ms of work
-WORTH = 400_000
+WORTH_THREADS = 400_000
 
 
 @part
@@ -70,7 +70,7 @@ def springs_of(model):
 @kernel
 def threads_for(springs, poses):
     """How many threads share a pass over the members at so many poses."""
-    return springs.threads if springs.threads > 0 and springs.member.shape[1] * poses >= WORTH else 1
+    return springs.threads if springs.threads > 0 and springs.member.shape[1] * poses >= WORTH_THREADS else 1
 
 
 @part

@@ -14,12 +14,12 @@ import numpy as np
 from mdstopo.optimizer.conic import Lines, Norms
 from mdstopo.optimizer.problem import Bools, Floats, Ints, Sample, largest_of_groups
 from mdstopo.optimizer.stack import Slopes, Stack, alike, joined, slopes_of, steepest_of
-from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.optimizer.wide_numbers import VERY_MANY_VARIABLES
 
 #: numbers that the rows may take; the least and the most rows that may be kept, of very many variables the least
-ROOM, LEAST, MOST = 2e7, 8, 160
+ROOM_FOR_ROWS, LEAST_ROWS, MOST_ROWS = 2e7, 8, 160
 #: a row within this of another of its group, in slope and in value relative to the steepest, is the same
-SAME = 1e-9
+SAME_ROW = 1e-9
 #: share of a row's slope by which a row from elsewhere may differ from it and still be the same peak, seen earlier
 SEEN_AGAIN = 0.1
 #: how much the vector of a norm changes in a box, in its own length, up to which the norm is a line there
@@ -57,7 +57,7 @@ class Bundle:
         """The rows of a sample, seen from there: of the objective those at the places `rows`, of constraints all."""
         n, many = sample.gradients.shape[1], len(sample.constraint_rows)
         value = np.concatenate([sample.rows[rows], sample.constraint_rows])
-        every, wide = len(rows) == len(sample.rows), n >= WIDE
+        every, wide = len(rows) == len(sample.rows), n >= VERY_MANY_VARIABLES
         chosen = sample.gradients if every else sample.gradients[rows]
         slope = (Stack.of if wide else _stacked)(chosen, sample.constraint_gradients.reshape(-1, n))
         lines = np.full(len(sample.rows), np.nan), np.full(many, np.nan)
@@ -191,18 +191,18 @@ class Bundle:
         return Bundle(vector, slope, np.concatenate(wide), offset, group, own, age, distance)
 
     def without_repeats(self) -> "Bundle":
-        """The rows, and of those that are the same within SAME only the last one."""
+        """The rows, and of those that are the same within SAME_ROW only the last one."""
         if len(self) < 2:
             return self
         steepest, values = self.steepest, self.values()
         # slopes that are the same have nearly the same sum: most pairs need not be compared entry by entry
         total = np.zeros(len(self)) if isinstance(self.slope, Stack) else np.einsum("rn->r", self.slope)
         near = self.group[:, None] == self.group
-        near &= np.abs(values - values[:, None]) <= (SAME * np.maximum(steepest, 1e-300))[:, None]
-        near &= np.abs(total - total[:, None]) <= (2.0 * SAME * self.slope.shape[1] * steepest)[:, None]
+        near &= np.abs(values - values[:, None]) <= (SAME_ROW * np.maximum(steepest, 1e-300))[:, None]
+        near &= np.abs(total - total[:, None]) <= (2.0 * SAME_ROW * self.slope.shape[1] * steepest)[:, None]
         kept = np.ones(len(self), dtype=np.bool_)
         for i, k in np.argwhere(np.triu(near, 1)).tolist():
-            if kept[i] and alike(self.slope, k, i, SAME * steepest[i]):
+            if kept[i] and alike(self.slope, k, i, SAME_ROW * steepest[i]):
                 kept[i] = False
         return self if kept.all() else self.subset(kept)
 
@@ -233,7 +233,7 @@ class Bundle:
         Beside many own rows there may be half as many others as rows may be kept: a trial that fails is to be known by
         the next one. Of very many variables own rows may be all.
         """
-        most, wide = self._most(), self.slope.shape[1] >= WIDE
+        most, wide = self._most(), self.slope.shape[1] >= VERY_MANY_VARIABLES
         others = np.flatnonzero(~self.own)
         free = max(most - (len(self) - len(others)), 0 if wide else most // 2)
         if len(others) <= free:
@@ -245,11 +245,11 @@ class Bundle:
     def with_rejected(self, seen: "Bundle", below: Floats) -> "Bundle":
         """These rows with those of a rejected trial, seen from the iterate, as the newest ones that are not its own.
 
-        At most a quarter of the rows that may be kept, or `LEAST`, are one trial's: those nearest to carrying a
+        At most a quarter of the rows that may be kept, or `LEAST_ROWS`, are one trial's: those nearest to carrying a
         multiplier there.
         below (K,): how far each is from that, as `Bundle.below` tells it.
         """
-        most = max(self._most() // 4, LEAST)
+        most = max(self._most() // 4, LEAST_ROWS)
         nearest = np.sort(np.argsort(below, kind="stable")[:most])
         return self.subset(~self.own).joined(seen.subset(nearest)).joined(self.subset(self.own))
 
@@ -264,7 +264,7 @@ class Bundle:
     def _most(self) -> int:
         """How many rows may be kept."""
         n = max(self.slope.shape[1], 1)
-        return LEAST if n >= WIDE else int(min(max(ROOM / n, LEAST), MOST))
+        return LEAST_ROWS if n >= VERY_MANY_VARIABLES else int(min(max(ROOM_FOR_ROWS / n, LEAST_ROWS), MOST_ROWS))
 
     def aged(self, multipliers: Floats, enough: Floats) -> "Bundle":
         """The rows after a subproblem with multipliers (K,), with new ages; enough (groups,): the least that counts."""

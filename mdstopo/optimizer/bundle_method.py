@@ -8,12 +8,12 @@ import numpy as np
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.competing_rows import (
     FLOOR,
-    MARGIN,
-    NOTHING,
+    NO_VIOLATION,
     NULL_STEP_SHRINK,
     RAISE,
     RAISES,
     STEER,
+    VIOLATION_COST,
     Around,
     RowModel,
     SecantPairs,
@@ -48,7 +48,7 @@ RETURN_TRUST, LEAST_RESET_TRUST = 1e-3, 1e-2
 #: factor on the box, or on a step that was shorter, where the model proves poor; and the least box, in ranges, after it
 SHRINK, LEAST_TRUST = 0.5, 1e-12
 #: shares of the box above which a step is held back by it, and below which a step leaves it too wide
-LONG, NARROW = 0.5, 0.1
+LONG_STEP, NARROW_STEP = 0.5, 0.1
 #: of a smooth objective: lengths of the last step beyond which rows from elsewhere are dropped; and the least and the
 #: most that is left of a step that was rejected
 FARTHEST, LEAST_LEFT, MOST_LEFT = 5.0, 0.1, 0.6
@@ -56,7 +56,7 @@ FARTHEST, LEAST_LEFT, MOST_LEFT = 5.0, 0.1, 0.6
 NO_DECREASE = 1e-13
 #: of a smooth objective: the shares of the promised decrease between which a step gains what was promised, how many
 #: such steps in a row show that the curvature is known, and how many times a promise is gained where it was not
-TRUE, TRUE_STEPS, WRONG = (0.5, 2.0), 3, 10.0
+PROMISE_KEPT, TRUE_STEPS, PROMISE_EXCEEDED = (0.5, 2.0), 3, 10.0
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
 #: for a null step, both in shares of those levels
 DECISIVE, NOT_ABOVE = 1e-12, 1e-9
@@ -92,7 +92,7 @@ class BundleMethod:
         tolerance = self.settings.tolerance
         done = state.kkt <= tolerance
         if state.restoring:
-            kept = plain_violation(state.sample) <= NOTHING * tolerance
+            kept = plain_violation(state.sample) <= NO_VIOLATION * tolerance
             # what is left may be rounding of a steep limit: within the tolerance it is kept
             if kept or ((stuck or done) and state.violation <= tolerance):
                 self._return_to_objective(state)
@@ -160,7 +160,8 @@ class BundleMethod:
         state.penalty = RESTORED_PENALTY * state.penalty
 
     def _reset(self, state: GsaoState) -> bool:
-        """Drop rows of other designs, which may forbid what is possible; False where that was done too often here."""
+        """Drop rows that belong to other designs: they may exclude steps that are possible. False where that was done
+        `RESETS` times already."""
         if state.resets >= RESETS:
             return False
         trust = RESET_TRUST * RESET_SHRINK**state.resets
@@ -174,7 +175,7 @@ class BundleMethod:
         groups = int(rows.group.max(initial=0)) + 1
         steepest = largest_of_groups(rows.steepest, rows.group, groups)
         steepest = np.where(np.isfinite(steepest) & (steepest > 0.0), steepest, 1.0)
-        return np.asarray(MARGIN * steepest[0] / steepest[1:])
+        return np.asarray(VIOLATION_COST * steepest[0] / steepest[1:])
 
     # -- the steps
 
@@ -204,9 +205,9 @@ class BundleMethod:
         goes_on = smooth and ratio > settings.number("poor_ratio")
         state.small = state.small + 1 if small and not goes_on else 0
         accepted = ratio >= settings.number("accept_ratio")
-        state.true_steps = state.true_steps + 1 if smooth and TRUE[0] <= ratio <= TRUE[1] else 0
+        state.true_steps = state.true_steps + 1 if smooth and PROMISE_KEPT[0] <= ratio <= PROMISE_KEPT[1] else 0
         if accepted:
-            if actual > WRONG * state.promised:
+            if actual > PROMISE_EXCEEDED * state.promised:
                 state.promised = float("inf")
             promised = moved.subset(state.bundle.own).levels(groups)
             self._count_stagnation(state, *(float(levels[1:].max(initial=0.0)) for levels in (here, promised, there)))
@@ -251,7 +252,7 @@ class BundleMethod:
             trial = self._steer(state, rows, around.flat(FLOOR * steepest), here)
         promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty)
         state.predicted = merit(here[0], here[1:], state.penalty) - promised
-        if state.true_steps >= TRUE_STEPS and self.model.lengths(trial.x - state.alpha)[0] <= LONG * state.trust:
+        if state.true_steps >= TRUE_STEPS and self.model.lengths(trial.x - state.alpha)[0] <= LONG_STEP * state.trust:
             state.promised = min(state.promised, state.predicted)
         state.trial = trial.x
         state.multipliers = trial.multipliers
@@ -326,12 +327,12 @@ class BundleMethod:
     def _trust_after_step(self, trust: float, size: float, ratio: float) -> float:
         """The box after an accepted step of this size, both in ranges; ratio: of actual to predicted decrease."""
         settings = self.settings
-        if ratio > settings.number("good_ratio") and size > LONG * trust:
+        if ratio > settings.number("good_ratio") and size > LONG_STEP * trust:
             return min(1.0, settings.number("trust_grow") * trust)
         if ratio < settings.number("poor_ratio"):
             return max(SHRINK * min(trust, size), LEAST_TRUST)
-        if size < NARROW * trust:  # a box of the size of the steps is solved to more digits
-            return max(SHRINK * trust, size / NARROW)
+        if size < NARROW_STEP * trust:  # a box of the size of the steps is solved to more digits
+            return max(SHRINK * trust, size / NARROW_STEP)
         return trust
 
     def _bundle(self, sample: Sample, restoring: bool) -> Bundle:
@@ -361,7 +362,7 @@ class BundleMethod:
         if not len(state.penalty):
             return trial
         reach = around.reach(rows.subset(rows.group > 0))
-        tiny = max(NOTHING * self.settings.tolerance, ROUNDING * float(reach.max(initial=0.0)))
+        tiny = max(NO_VIOLATION * self.settings.tolerance, ROUNDING * float(reach.max(initial=0.0)))
         # as in the merit, so that penalties raised in proportion lead to the least of this sum
         weight = state.penalty / state.penalty.max()
 
@@ -383,7 +384,8 @@ class BundleMethod:
             trial.violates(rows, state.penalty, tiny),
             state.penalty,
             np.maximum(
-                np.maximum(MARGIN * carried, PENALTY_FALL * state.penalty), LEAST_PENALTY * self.first_penalty(rows)
+                np.maximum(VIOLATION_COST * carried, PENALTY_FALL * state.penalty),
+                LEAST_PENALTY * self.first_penalty(rows),
             ),
         )
         return trial

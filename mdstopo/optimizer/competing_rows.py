@@ -20,7 +20,7 @@ import numpy as np
 
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.conic import Program, Solution, solve
-from mdstopo.optimizer.curvature import FEW, Curvature, learnt
+from mdstopo.optimizer.curvature import FEW_VARIABLES, Curvature, learnt
 from mdstopo.optimizer.nearest_feasible import repair
 from mdstopo.optimizer.problem import Bools, Floats, Ints, LinearRows, largest_of_groups, scale_of
 from mdstopo.optimizer.stack import Slopes, Stack, joined
@@ -28,7 +28,7 @@ from mdstopo.optimizer.stack import Slopes, Stack, joined
 #: what violations cost, in multipliers of their limits: more than one, or the merit would be least where limits are
 #: violated, but little more, or it would reject long steps along a curved limit; the least share of the violation that
 #: could go which has to go; the factor on penalties until it does, and how often
-MARGIN, STEER, RAISE, RAISES = 1.2, 0.3, 5.0, 8
+VIOLATION_COST, STEER, RAISE, RAISES = 1.2, 0.3, 5.0, 8
 #: steps that curvature is learnt from, where B is a matrix, where it is that of a smooth objective, and where B is none
 STEPS, SMOOTH_STEPS, FEW_STEPS = 60, 120, 12
 #: the least curvature, of the largest gradient entry over the range
@@ -38,12 +38,12 @@ MATCH_COSINE = 0.5
 #: how much a rejected trial shrinks the box where its rows tell what stood in the way
 NULL_STEP_SHRINK = 0.7
 #: how far a row may lie below the highest, or from its limit, to compete in the residual, in largest gradient entries
-NEAR = 1e-3
+NEAR_ROW = 1e-3
 #: a violation below this share of the tolerance is none
-NOTHING = 1e-3
+NO_VIOLATION = 1e-3
 #: bounds of multipliers, in largest gradient entries of the objective, with which the residual's subproblem is solved
 #: where it cannot be with higher ones
-HIGHEST = 1e6
+HIGHEST_MULTIPLIER = 1e6
 #: the least share of its penalty that the rows of a violated constraint carry: all of it, but for rounding
 AT_PENALTY = 0.9
 
@@ -174,7 +174,7 @@ class DenseModel:
         Of a smooth objective they are more than it has variables, as far as they may: with as many steps as variables
         the flat directions of a long valley are forgotten before all are known, and it is crept along.
         """
-        most = FEW_STEPS if len(more) > FEW else SMOOTH_STEPS if smooth else STEPS
+        most = FEW_STEPS if len(more) > FEW_VARIABLES else SMOOTH_STEPS if smooth else STEPS
         return joined(known, more[None])[-most:]
 
 
@@ -397,7 +397,7 @@ def multipliers(
         return 0.0, np.eye(1, len(own))[0], np.zeros(len(space.linear.A))
     lines = own.with_tangents(own.norm)
     found = _multipliers_of(lines, x, space, penalty, steepest)
-    near = _gaps(lines) <= NEAR * steepest * space.scale
+    near = _gaps(lines) <= NEAR_ROW * steepest * space.scale
     if near.all() or not (near & (lines.group == 0)).any():
         return found
     among = _multipliers_of(lines.subset(near), x, space, penalty, steepest)
@@ -415,7 +415,7 @@ def _multipliers_of(
     flat, whole = Curvature.diagonal_of(np.full(len(x), steepest / space.scale)), (space.lower, space.upper)
     trial = subproblem(lines, x, space, whole, penalty, flat)
     if not trial.solved:  # as where limits contradict each other, and penalties have risen by many powers of ten
-        trial = subproblem(lines, x, space, whole, np.minimum(penalty, HIGHEST * steepest), flat)
+        trial = subproblem(lines, x, space, whole, np.minimum(penalty, HIGHEST_MULTIPLIER * steepest), flat)
     found = residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
     return found, trial.multipliers, trial.linear
 

@@ -12,7 +12,7 @@ from mdstopo.compiler.jit import member_kernel
 from mdstopo.optimizer.problem import Floats
 
 #: what a determinant is at least: a point on the boundary is taken to be next to it
-TINY = 1e-30
+LEAST_DETERMINANT = 1e-30
 
 
 class Scaling(NamedTuple):
@@ -55,7 +55,7 @@ def scaling_of(s: Floats, y: Floats) -> Scaling:
     half = np.sqrt(0.5)
     for k in range(K):
         w, squares, turn = found.w[k], found.squares[k], found.turn[k]
-        det_s, det_y = max(determinant(s[k]), TINY), max(determinant(y[k]), TINY)
+        det_s, det_y = max(determinant(s[k]), LEAST_DETERMINANT), max(determinant(y[k]), LEAST_DETERMINANT)
         by_s, by_y = 1.0 / np.sqrt(det_s), 1.0 / np.sqrt(det_y)
         inner = 0.0
         for i in range(3):

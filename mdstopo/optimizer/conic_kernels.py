@@ -26,7 +26,7 @@ ENOUGH_GAP, ENOUGH_RESIDUAL = 1e-8, 1e-8
 #: the point counts as solved
 PATIENCE, MORE = 3, 5
 #: share of the way to the boundary that a step goes, and the least step
-SHARE, LEAST = 0.99, 1e-14
+BOUNDARY_SHARE, LEAST_STEP = 0.99, 1e-14
 
 
 class Scaled(NamedTuple):
@@ -246,7 +246,7 @@ def _advance(
         _direct(p, parts, system, rows, scaling, pair, missing, aim, aim_cone, step, step_cone, step_free)
         if not _largest(step[0, :n]) < np.inf:
             return False
-        share = SHARE if corrector == 1 else 1.0
+        share = BOUNDARY_SHARE if corrector == 1 else 1.0
         a = min(1.0, share * min(_longest(pair, step), cones.longest(scaling, step_cone[0], step_cone[1])))
         if corrector == 0:
             after = 0.0
@@ -256,7 +256,7 @@ def _advance(
                 for i in range(3):
                     after += (cone[0, k, i] + a * step_cone[0, k, i]) * (cone[1, k, i] + a * step_cone[1, k, i])
             target = centred_gap(gap, min(1.0, max(0.0, after / count / gap))) if gap > 0.0 else 0.0
-    if not a > LEAST:
+    if not a > LEAST_STEP:
         return False
     for side in range(2):
         add(pair[side], a, step[side])

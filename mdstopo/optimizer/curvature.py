@@ -15,7 +15,7 @@ import numpy as np
 from mdstopo.optimizer.problem import Bools, Floats
 
 #: variables up to which B is a matrix, and the last steps that it is learnt from where it is none
-FEW, PAIRS = 250, 12
+FEW_VARIABLES, KEPT_STEPS = 250, 12
 #: the least y's over s'B s, before y is damped
 DAMPING = 0.2
 #: the share of B's curvature along a step below which B is scaled down, by this factor
@@ -72,8 +72,8 @@ def learnt(steps: Floats, changes: Floats, floor: float, scaled_down: bool = Tru
     """
     n = steps.shape[1]
     sigma = _first(steps, changes, floor)
-    if n > FEW:
-        return _compact(steps[-PAIRS:], changes[-PAIRS:], sigma)
+    if n > FEW_VARIABLES:
+        return _compact(steps[-KEPT_STEPS:], changes[-KEPT_STEPS:], sigma)
     B = sigma * np.eye(n)
     for s, y in zip(steps, changes, strict=True):
         Bs = B @ s

@@ -23,7 +23,7 @@ from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State
 from mdstopo.optimizer.violations import better, plain_violation, scaled_violation
 from mdstopo.optimizer.wide import Measures, Space, ranges
-from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.optimizer.wide_numbers import VERY_MANY_VARIABLES
 from mdstopo.optimizer.wide_rows import WideModel
 from mdstopo.settings.optimizer_presets import Settings
 from mdstopo.status import RunStatus, Status
@@ -82,7 +82,7 @@ class Gsao:
 
     def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
         """The bundle method for the problem's size; of very many variables only where rows compete from the start."""
-        if len(self.lower) < WIDE:
+        if len(self.lower) < VERY_MANY_VARIABLES:
             return BundleMethod(DenseModel(space), self.settings, self.smooth)
         if not self.competes:
             return None

@@ -10,7 +10,7 @@ from mdstopo.compiler.jit import member_kernel
 from mdstopo.optimizer.problem import Floats, Ints
 
 #: terms that the series of `primitives` may have, a multiple of four, and what the next one may be of the first
-LONGEST, NEGLIGIBLE = 48, 1e-17
+MOST_TERMS, NEGLIGIBLE = 48, 1e-17
 #: numbers from which on it would not do
 FARTHEST = 0.6
 #: all bits of a float but its sign
@@ -101,12 +101,12 @@ def primitives(z: Floats, power: float, value: Floats, room: Ints) -> None:
             value[i] = z[i] / (1.0 + z[i])
         return
     most = largest(z)
-    ratio, coefficient = np.empty(LONGEST), np.empty(LONGEST + 1)
-    for k in range(LONGEST):
+    ratio, coefficient = np.empty(MOST_TERMS), np.empty(MOST_TERMS + 1)
+    for k in range(MOST_TERMS):
         ratio[k] = (power - 1.0 - k) / (2.0 + k)
     coefficient[0] = 1.0
     last, reach = 0, 1.0
-    while last < LONGEST and reach > NEGLIGIBLE and most < FARTHEST:
+    while last < MOST_TERMS and reach > NEGLIGIBLE and most < FARTHEST:
         for k in range(last, last + 4):
             coefficient[k + 1] = coefficient[k] * ratio[k]
             reach *= most * abs(ratio[k])

@@ -33,7 +33,7 @@ from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.settings.scalarisations import SCALARISATIONS
 
 #: rows that one U has at most, and one plane of `nc`; choices of peaks that are all taken; the highest of more
-ROWS, LIMITS, CHOICES, HIGHEST = 120, 12, 36, 27
+MOST_ROWS_OF_U, MOST_PLANE_ROWS, ALL_CHOICES, HIGHEST_CHOICES = 120, 12, 36, 27
 
 #: values (P,) of an objective's peaks, highest first, and their gradients (P, N); no rows where none were asked for
 Part = tuple[Floats, Floats]
@@ -114,7 +114,7 @@ class Scalarisation:
                 n * self.transformed(values if n > 0.0 else values[:1], i)[0]
                 for i, (n, (values, _)) in enumerate(zip(plane, parts, strict=True))
             ]
-            for choice in highest_choices(shares, LIMITS):
+            for choice in highest_choices(shares, MOST_PLANE_ROWS):
                 rows.append(float(sum(share[p] for share, p in zip(shares, choice, strict=True)) - plane @ self.anchor))
                 of_plane.append(k)
                 if all(len(part[1]) for part in parts):
@@ -294,11 +294,11 @@ def _choices(shares: Sequence[Floats]) -> list[tuple[int, ...]]:
     all choices of these to tell that U has no descent. What lower choices would add, trials tell as they come.
     """
     counts = [len(one) for one in shares]
-    if prod(counts) <= CHOICES:
+    if prod(counts) <= ALL_CHOICES:
         return list(product(*(range(count) for count in counts)))
     top = (0,) * len(counts)
     single = [(*top[:k], p, *top[k + 1 :]) for k, count in enumerate(counts) for p in range(1, count)]
-    return list(dict.fromkeys(highest_choices(shares, HIGHEST) + single))
+    return list(dict.fromkeys(highest_choices(shares, HIGHEST_CHOICES) + single))
 
 
 def highest_choices(shares: Sequence[Floats], most: int) -> list[tuple[int, ...]]:
@@ -323,5 +323,5 @@ def highest_choices(shares: Sequence[Floats], most: int) -> list[tuple[int, ...]
 
 
 def _sorted(rows: Floats, gradients: Floats) -> tuple[Floats, Floats]:
-    order = np.argsort(-rows, kind="stable")[:ROWS]
+    order = np.argsort(-rows, kind="stable")[:MOST_ROWS_OF_U]
     return rows[order], (gradients[order] if len(gradients) else gradients)

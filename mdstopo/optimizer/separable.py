@@ -33,7 +33,7 @@ from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.subproblem import solve
 from mdstopo.optimizer.violations import merit, scaled_violation
 from mdstopo.optimizer.wide import Measures, ShiftRule, is_wide, next_wide_shift, propose
-from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.optimizer.wide_numbers import VERY_MANY_VARIABLES
 from mdstopo.settings.optimizer_presets import Settings
 from mdstopo.status import RunStatus
 
@@ -95,7 +95,7 @@ class SeparableMethod:
             state.cuts, state.cut_gradients, state.cuts_lowered = cuts_from(state, state.trial, sample.objective)
             self._follow(state)
             state.take(sample, scaled_violation(sample))
-        elif len(state.alpha) < WIDE and settings.number("peaks") > 1:
+        elif len(state.alpha) < VERY_MANY_VARIABLES and settings.number("peaks") > 1:
             state.cuts, state.cut_gradients, state.cuts_lowered, told = cuts_of(state, sample)
             if told:
                 state.trust, state.convex = CUT_SHRINK * trust, convex
@@ -138,7 +138,7 @@ class SeparableMethod:
     def _follow(self, state: GsaoState) -> None:
         """The shifts after the step from the iterate to the trial."""
         last, state.step = state.step, Step(state.trial, state.alpha)
-        if len(state.alpha) >= WIDE:
+        if len(state.alpha) >= VERY_MANY_VARIABLES:
             state.shift = next_wide_shift(state.shift, last, state.step, self._rule, self._measures.room)
         else:
             state.shift = Shifts(next_shift(state.shift.array(), last, state.step, self.settings))

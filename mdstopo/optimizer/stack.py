@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.optimizer.problem import Bools, Floats, Ints
-from mdstopo.optimizer.wide_numbers import WIDE, steepest, total
+from mdstopo.optimizer.wide_numbers import VERY_MANY_VARIABLES, steepest, total
 
 
 class Stack:
@@ -54,7 +54,7 @@ Slopes: TypeAlias = Floats | Stack
 
 def slopes_of(matrix: Slopes) -> Slopes:
     """Gradients in the form in which they are kept: a stack where the variables are very many."""
-    return Stack.of(matrix) if isinstance(matrix, np.ndarray) and matrix.shape[1] >= WIDE else matrix
+    return Stack.of(matrix) if isinstance(matrix, np.ndarray) and matrix.shape[1] >= VERY_MANY_VARIABLES else matrix
 
 
 def joined(one: Slopes, other: Slopes) -> Slopes:

@@ -25,8 +25,8 @@ from mdstopo.optimizer.gsao_state import GsaoState, Step
 from mdstopo.optimizer.nearest_feasible import ROUNDING, repair
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, scale_of
 from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
-from mdstopo.optimizer.wide_numbers import LIGHT, WIDE, steepest, stride, threads_for, total
+from mdstopo.optimizer.wide_kernels import ROW_SOLVED, SAMPLE, wide_minimum, wide_rows
+from mdstopo.optimizer.wide_numbers import LIGHT, VERY_MANY_VARIABLES, steepest, stride, threads_for, total
 from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_shift, wide_shift_few, wide_steepest_and_sum
 from mdstopo.optimizer.wide_slots import COST, HIGH, LOW, SLOTS
 from mdstopo.settings.optimizer_presets import Settings
@@ -35,7 +35,7 @@ Indices = NDArray[np.intp]
 T = TypeVar("T")
 
 #: variables from which on this way is taken
-MANY = 256
+MANY_VARIABLES = 256
 _LEAST_SAMPLE = 256
 #: where more than one in so many variables had a slot, the memory of the slots is not kept
 MUCH = 16
@@ -74,7 +74,7 @@ def ranges(lower: Floats, upper: Floats) -> Floats:
 def short(x: Floats) -> Floats:
     """The first piece of a long array whose numbers are all alike, which stands for the whole; any other array as it
     is."""
-    return x[:PIECE] if len(x) >= WIDE and bool((x == x[0]).all()) else x
+    return x[:PIECE] if len(x) >= VERY_MANY_VARIABLES and bool((x == x[0]).all()) else x
 
 
 class Kept(Generic[T]):
@@ -152,7 +152,12 @@ class Measures:
     def look(self, gradients: Floats, x: Floats) -> None:
         """Compute `steepest` of the gradients (R, N) and `excess` of x, in one pass where that is possible."""
         rows = self.space.rows
-        if len(x) >= WIDE and gradients.shape == (1, len(x)) and gradients.flags.c_contiguous and len(rows) == 1:
+        if (
+            len(x) >= VERY_MANY_VARIABLES
+            and gradients.shape == (1, len(x))
+            and gradients.flags.c_contiguous
+            and len(rows) == 1
+        ):
             most, total = wide_steepest_and_sum(gradients[0], rows[0], x, threads_for(len(x), LIGHT))
             self.steepest.tell(np.array([most]), gradients)
             self.excess.tell(total - self.space.linear.b, x)
@@ -161,7 +166,7 @@ class Measures:
 def is_wide(state: GsaoState, linear: LinearRows, settings: Settings) -> bool:
     """Whether `propose` may make the next step of a state."""
     return (
-        len(state.alpha) >= MANY
+        len(state.alpha) >= MANY_VARIABLES
         and len(linear) == 1
         and state.convex > 0.0
         and settings.number("power") != 0.0
@@ -197,7 +202,7 @@ def propose(state: GsaoState, chosen: Indices, measures: Measures, settings: Set
         counts, x,
     )  # fmt: skip
     room.used(count)
-    if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > SOLVED * size and multiplier != 0.0):
+    if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > ROW_SOLVED * size and multiplier != 0.0):
         return None
     if miss > ROUNDING * size or (linear.equal[0] and miss < -ROUNDING * size):
         trial = _touched_up(trial, slots[:, :count], place[:count], measures, ROUNDING * size)
@@ -273,7 +278,7 @@ def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room
 
 def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
     """The largest change max |x - y|, and the largest in units of each variable."""
-    if len(x) >= WIDE:
+    if len(x) >= VERY_MANY_VARIABLES:
         plain, scaled = wide_change(x, y, unit, threads_for(len(x), LIGHT))
         return plain, scaled
     change = np.abs(x - y)
@@ -282,7 +287,7 @@ def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
 
 def excess(space: Space, x: Floats) -> Floats:
     """By how much a design exceeds the bounds of the linear rows: A x - b (m,)."""
-    if len(x) < WIDE:
+    if len(x) < VERY_MANY_VARIABLES:
         return space.linear.excess(x)
     return np.array([total(row, x) for row in space.rows]) - space.linear.b
 

@@ -8,7 +8,7 @@
 
 theta (R,) are the rows' multipliers; of a row of the curvature -M^-1 w. Bounds are eliminated variable by variable;
 each step of Mehrotra's predictor and corrector solves one dense system of the size of the rows and the groups. Arrays
-are those of `interior_kernels`; there a variable without bounds has both `AWAY`.
+are those of `interior_kernels`; there a variable without bounds has both `NO_BOUND`.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ BLOCK = 1024
 #: what a row is
 LINE, LIMIT, EQUAL, CURVED = 0, 1, 2, 3
 #: the distance to a bound that there is not, and its multiplier
-AWAY, NOTHING = 1e150, 1e-300
+NO_BOUND, NO_MULTIPLIER = 1e150, 1e-300
 #: steps without halving what is missing after which rounding is all that is left
 PATIENCE = 4
 

@@ -13,15 +13,15 @@ from mdstopo.compiler.jit import member_kernel, vector_entry
 from mdstopo.compiler.vector import fetch
 from mdstopo.optimizer.powers import primitives
 from mdstopo.optimizer.problem import Floats, Ints
-from mdstopo.optimizer.wide_passes import SOON, part
+from mdstopo.optimizer.wide_passes import FETCHED_AHEAD, part
 from mdstopo.optimizer.wide_slots import (
-    BEYOND,
+    BEYOND_MULTIPLIERS,
     BLOCK,
     COST,
     ITERATE,
+    LEAST_WIDTH,
     ROOM,
     ROW,
-    TINY,
     WHOLE,
     box,
     bracket_slots,
@@ -36,15 +36,15 @@ from mdstopo.optimizer.wide_sorting import fix_by_bracket, measure, one
 #: leaves more in doubt, a narrower one misses more often
 SAMPLE, SPREAD = 4096, 2.2
 #: what may be left of a sample's row, relative to what its variables can move, and to the half width
-ENOUGH, ENOUGH_OF_SPREAD = 1e-3, 0.1
-#: a sample that takes about every COARSER-th of those is solved first, where it has at least FEWEST variables
-FEWEST, COARSER = 128, 8
+ENOUGH_OF_RANGE, ENOUGH_OF_SPREAD = 1e-3, 0.1
+#: a sample that takes about every COARSER-th of those is solved first, where it has at least FEWEST_SAMPLED variables
+FEWEST_SAMPLED, COARSER = 128, 8
 #: by how much its bracket is widened, relative to the multiplier
-WIDER = 0.15
+BRACKET_WIDER = 0.15
 #: brackets that are tried, the last of them without ends
 ATTEMPTS = 6
 #: what may be left of the row where it is solved, and after it is settled, relative to the size of its sums
-SOLVED, SETTLED = 1e-9, 1e-15
+ROW_SOLVED, ROW_SETTLED = 1e-9, 1e-15
 
 
 @member_kernel
@@ -78,7 +78,7 @@ def _estimate(
     sampled = (N + stride - 1) // stride
     goal, extent = gap * sampled / N, 0.0
     for i in range(0, N, stride):
-        later = i + SOON * stride
+        later = i + FETCHED_AHEAD * stride
         fetch(alpha, later)
         fetch(slope, later)
         fetch(shift, later)
@@ -94,7 +94,7 @@ def _estimate(
     ends = bracket_slots(slots, n, power, room, whole)
     if ends[0] > ends[1]:  # none that the multiplier moves
         return near, guess, far
-    enough = ENOUGH * extent
+    enough = ENOUGH_OF_RANGE * extent
     guess, _, _, falling = root(slots, n, ends, x, goal, near, guess, far, power, enough, bool(0), room, whole)
     mean, square = 0.0, 0.0
     for k in range(n):
@@ -102,7 +102,7 @@ def _estimate(
         mean += moved / sampled
         square += moved * moved
     spread = SPREAD * np.sqrt(max(square - sampled * mean * mean, 0.0))
-    enough, apart = max(enough, ENOUGH_OF_SPREAD * spread), spread / max(-falling, TINY)
+    enough, apart = max(enough, ENOUGH_OF_SPREAD * spread), spread / max(-falling, LEAST_WIDTH)
     more, less = goal + spread, goal - spread
     first = root(slots, n, ends, x, more, near, guess - apart, far, power, enough, bool(0), room, whole)[0]
     last = root(slots, n, ends, x, less, near, guess + apart, far, power, enough, bool(0), room, whole)[0]
@@ -144,22 +144,22 @@ def wide_minimum(
     """
     power = limits[0]
     room, whole = np.empty((ROOM, ROW)), np.empty((WHOLE, ROW), dtype=np.int64)
-    least = -BEYOND if equal else 0.0
-    near, guess, far, gap, coarse = least, 0.0, BEYOND, bound - at_iterate, COARSER * stride + 1
-    if len(alpha) >= FEWEST * coarse:
+    least = -BEYOND_MULTIPLIERS if equal else 0.0
+    near, guess, far, gap, coarse = least, 0.0, BEYOND_MULTIPLIERS, bound - at_iterate, COARSER * stride + 1
+    if len(alpha) >= FEWEST_SAMPLED * coarse:
         near, guess, far = _estimate(
             alpha, slope, cost, shift, lower, upper, limits, gap, near, guess, far, coarse, slots, place, x, room, whole
         )
         # of so few very few move: a bracket that is too wide costs less than a wrong one
-        wider = 0.5 * (far - near) + WIDER * abs(guess)
-        near, far = max(least, near - wider), min(BEYOND, far + wider)
+        wider = 0.5 * (far - near) + BRACKET_WIDER * abs(guess)
+        near, far = max(least, near - wider), min(BEYOND_MULTIPLIERS, far + wider)
     near, guess, far = _estimate(
         alpha, slope, cost, shift, lower, upper, limits, gap, near, guess, far, stride, slots, place, x, room, whole
     )
     multiplier, miss, total, size, change, n = 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for attempt in range(ATTEMPTS):
         if attempt == ATTEMPTS - 1:
-            near, far = least, BEYOND
+            near, far = least, BEYOND_MULTIPLIERS
         n, total, size, change = fix_by_bracket(
             alpha, slope, cost, shift, lower, upper, limits, near, far, threads, out, slots, place, listed, counts
         )
@@ -181,8 +181,8 @@ def wide_minimum(
     size += abs(bound)
     for k in range(n):
         size += abs(slots[COST, k] * x[k])
-    if abs(miss) <= SOLVED * size:
-        miss = settle(slots, n, x, bound - total, equal, SETTLED * size)
+    if abs(miss) <= ROW_SOLVED * size:
+        miss = settle(slots, n, x, bound - total, equal, ROW_SETTLED * size)
     for k in range(n):
         out[place[k]] = x[k]
     change += promise(slots, n, x, power, room, whole)

@@ -10,27 +10,27 @@ from mdstopo.optimizer.wide_passes import wide_largest, wide_sum
 
 #: variables from which on memory counts: single passes are compiled too, no cuts are kept, what is alike is not read
 #: again
-WIDE = 10_000
+VERY_MANY_VARIABLES = 10_000
 #: variables from which on threads share a pass
 SHARED = 200_000
 #: the same of a pass that does so little that making threads would cost as much
 LIGHT = 400_000
 #: numbers up to which Python is faster than NumPy
-FEW = 8
+FEW_NUMBERS = 8
 
 
 def steepest(gradients: Floats) -> Floats:
     """The largest size of an entry of each row (R,) of gradients (R, N); NaN where one is NaN."""
-    if gradients.shape[1] < WIDE:
+    if gradients.shape[1] < VERY_MANY_VARIABLES:
         return np.asarray(np.abs(gradients).max(axis=1, initial=0.0))
     return np.array([_largest(np.ascontiguousarray(row)) for row in gradients])
 
 
 def finite(numbers: Floats) -> bool:
     """Whether all numbers are finite."""
-    if numbers.size <= FEW:
+    if numbers.size <= FEW_NUMBERS:
         return all(map(isfinite, numbers.ravel().tolist()))
-    if numbers.size < WIDE or not numbers.flags.c_contiguous:
+    if numbers.size < VERY_MANY_VARIABLES or not numbers.flags.c_contiguous:
         return bool(np.isfinite(numbers).all())
     return isfinite(_largest(numbers.reshape(-1)))
 

@@ -16,7 +16,7 @@ from mdstopo.optimizer.problem import Floats, Ints
 PIECE, RUN = 8192, 512
 
 #: how many variables ahead of a loop over some of them their numbers are fetched
-SOON = 32
+FETCHED_AHEAD = 32
 
 
 @kernel
@@ -109,7 +109,7 @@ def wide_shift_few(
             word, bit = i >> 5, 2 * (i & 31)
             signs[word] |= sign << bit
             if known:
-                fetch(shift, moves[min(k + SOON, end - 1)] >> 2)
+                fetch(shift, moves[min(k + FETCHED_AHEAD, end - 1)] >> 2)
                 was, other = shift[i], (signs_before[word] >> bit) & 3
                 found = min(max(was * (grow if sign == other else shrink), least), most)
                 found = found if (sign != 0) & (other != 0) else was

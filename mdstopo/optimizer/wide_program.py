@@ -27,25 +27,25 @@ import numpy as np
 from mdstopo.optimizer.problem import Bools, Floats, Ints, largest_of_groups
 from mdstopo.optimizer.wide_classes import DOUBT, LONGEST, SCALED, TRUST, H, finish, sort
 from mdstopo.optimizer.wide_curvature import compact
-from mdstopo.optimizer.wide_interior import AWAY, CURVED, LIMIT, LINE, NOTHING, interior
+from mdstopo.optimizer.wide_interior import CURVED, LIMIT, LINE, NO_BOUND, NO_MULTIPLIER, interior
 from mdstopo.optimizer.wide_numbers import stride, threads_for
 from mdstopo.optimizer.wide_passes import PIECE
 
-#: variables of a sample, at least and at most, and every how many variables one more; of a sample of those in doubt the
-#: least. Variables up to which all in doubt are solved for at once
-SAMPLE, LARGEST, MORE, FEW = 768, 4_096, 256, 3_000
+#: variables of a sample at least (of a sample of those in doubt, too) and at most; between, a sample has one of so
+#: many. Up to how many variables in doubt are solved for at once, without a sample
+LEAST_SAMPLE, LARGEST_SAMPLE, VARIABLES_PER_MORE, FEW_IN_DOUBT = 768, 4_096, 256, 3_000
 #: mean product and residual of a solution of the small program, in its own scale; what counts as one; and of a sample
 EXACT, ENOUGH, ROUGH = (1e-14, 1e-11), (1e-8, 1e-8), (1e-9, 1e-9)
 #: what counts of a sample, in what was to be reached
-SLACK = 1e3
+SAMPLE_SLACK = 1e3
 MAX_STEPS = 100.0
 #: the doubt that a sample of n leaves, times the root of n; how often those who were taken for decided are added, or
 #: all are sorted again where they are more than this share of all
-DOUBTFUL, ROUNDS, AGAIN = 2.5, 12, 0.1
+DOUBTFUL, MOST_ROUNDS, AGAIN = 2.5, 12, 0.1
 #: by what the doubt grows where the program of those in doubt has no solution
-WIDER = 4.0
+DOUBT_GROWS = 4.0
 #: eigenvalues of the matrix of those inside their boxes that count, of the largest
-TINY = 1e-15
+LEAST_EIGENVALUE = 1e-15
 #: what the product of a row's slack and its multiplier is at first, at most
 CENTRED = 1.0
 #: what the multipliers of bounds are at first, in the largest derivative
@@ -53,7 +53,7 @@ OUTWEIGH = 2.0
 #: multipliers of lines below this, in mean products, are none
 NONE = 10.0
 #: how far below others a row is said to be at most, in what rows can change by; where variables have no bounds
-FAR, FARTHEST = 10.0, 1e3
+FAR_BELOW, FAR_BELOW_UNBOUNDED = 10.0, 1e3
 #: M of a row of the curvature that is to weigh nothing
 WEIGHTLESS = 1e20
 
@@ -198,17 +198,17 @@ def solve(program: WideProgram, room: Room) -> WideSolution:
     """Solve a program; the same to the bit on any number of threads."""
     region, n = program.region, len(program.region.x)
     nothing = np.zeros(len(program.places))
-    sample = np.arange(0, n, stride(n, min(LARGEST, max(SAMPLE, n // MORE))))
+    sample = np.arange(0, n, stride(n, min(LARGEST_SAMPLE, max(LEAST_SAMPLE, n // VARIABLES_PER_MORE))))
     every = _some(program, sample, n / len(sample))
     theta, _ = _multipliers(program, every, None, nothing, np.zeros((len(nothing), 0)))
     guess = Guess(theta, np.abs(theta), DOUBTFUL / np.sqrt(len(sample)))
     few, sums, inside, guess = _doubtful(program, guess, room)
     trial, change = np.empty(n), np.empty(len(theta))
-    for attempt in range(ROUNDS):
+    for attempt in range(MOST_ROUNDS):
         found = _solved(program, few, sums, inside, EXACT)
-        if not found.solved and attempt < ROUNDS - 1 and len(few.which) < n:
+        if not found.solved and attempt < MOST_ROUNDS - 1 and len(few.which) < n:
             # those in doubt cannot meet what the others leave: there have to be more
-            guess = guess._replace(doubt=WIDER * guess.doubt)
+            guess = guess._replace(doubt=DOUBT_GROWS * guess.doubt)
             few, sums, inside, guess = _doubtful(program, guess, room)
             continue
         trial[few.which] = _ends(region, few, found.d)
@@ -219,7 +219,7 @@ def solve(program: WideProgram, room: Room) -> WideSolution:
         others = room.variables()
         if not len(others) or not found.solved:
             break
-        if len(others) > AGAIN * n and attempt < ROUNDS // 2:
+        if len(others) > AGAIN * n and attempt < MOST_ROUNDS // 2:
             between = np.abs(found.theta - guess.theta) / guess.doubt
             guess = guess.moved(found.theta, guess.doubt)
             few, sums, inside, guess = _doubtful(program, guess._replace(spread=guess.spread + between), room)
@@ -279,18 +279,18 @@ def _doubtful(program: WideProgram, guess: Guess, room: Room) -> tuple[Few, Floa
     )  # fmt: skip
     few = _some(program, room.variables())
     met = np.abs(guess.theta)
-    while len(few.which) > FEW:
+    while len(few.which) > FEW_IN_DOUBT:
         n = len(few.which)
-        part = slice(None, None, stride(n, SAMPLE))
+        part = slice(None, None, stride(n, LEAST_SAMPLE))
         sample = few.some(part, n / len(few.which[part]))
         theta, solved = _multipliers(program, sample, few, sums, _factor(inside))
         if not solved:
             # they cannot meet what the others leave: there have to be more of them
             if n == len(region.x) or first.doubt > 1.0:
                 break
-            return _doubtful(program, first._replace(doubt=WIDER * first.doubt), room)
+            return _doubtful(program, first._replace(doubt=DOUBT_GROWS * first.doubt), room)
         met = np.maximum(met, np.abs(theta))
-        guess = Guess(theta, met, guess.doubt * max(DOUBTFUL / np.sqrt(len(sample.which)), 2.0 * FEW / n))
+        guess = Guess(theta, met, guess.doubt * max(DOUBTFUL / np.sqrt(len(sample.which)), 2.0 * FEW_IN_DOUBT / n))
         few, sums, inside = _decided(few, guess, sums, inside, room)
         if len(few.which) > 0.5 * n:
             break
@@ -344,7 +344,7 @@ def _factor(product: Floats) -> Floats:
         return np.zeros((len(size), 0))
     unit = np.where(size > 0.0, size, 1.0)
     values, vectors = np.linalg.eigh(product / unit[:, None] / unit)
-    used = values > TINY * values[-1]
+    used = values > LEAST_EIGENVALUE * values[-1]
     return np.asarray(size[:, None] * vectors[:, used] * np.sqrt(values[used]))
 
 
@@ -371,7 +371,7 @@ def _solved(program: WideProgram, few: Few, sums: Floats, inside: Floats, wanted
     f = (value - np.where(objective, base, 0.0)) / scale - Q @ at
     size = np.maximum(1.0, sizes.sum(axis=1) / scale)
     # a row that cannot come up to others might else be farther off than what all products together are rounded to
-    f = np.where(line, np.maximum(f, -(FAR if p == 0 else FARTHEST) * float(size.max())), f)
+    f = np.where(line, np.maximum(f, -(FAR_BELOW if p == 0 else FAR_BELOW_UNBOUNDED) * float(size.max())), f)
     frame = np.stack([at, np.full(n + p, 1.0 / own)])
     frame[1, :n] = few.h * width**2 * few.weight / own
     penalty = np.concatenate([[1.0 if objective.any() else 0.0], program.penalty * of_group[1:] / own])
@@ -383,7 +383,7 @@ def _solved(program: WideProgram, few: Few, sums: Floats, inside: Floats, wanted
     wl, wu, zl, zu = bounds[:, :n]
     d = np.where(wl < wu, few.low + wl * width, few.high - wu * width)
     d = np.where((zl > wl) & (wl < 1e-6), few.low, np.where((zu > wu) & (wu < 1e-6), few.high, d))
-    enough = np.maximum(SLACK * np.array(wanted), ENOUGH)
+    enough = np.maximum(SAMPLE_SLACK * np.array(wanted), ENOUGH)
     theta = np.where(line & (rows[1] <= NONE * wanted[0]), 0.0, rows[1]) * own / scale
     return Found(theta, d, bool(gap <= enough[0] and worst <= enough[1] and np.isfinite(d).all()))
 
@@ -405,7 +405,7 @@ def _start(
     v[:bounded] = np.clip(at[:bounded], 0.1, 0.9)
     bounds = np.full((4, len(v)), mu)
     bounds[0, :bounded], bounds[1, :bounded] = v[:bounded], 1.0 - v[:bounded]
-    bounds[:2, bounded:], bounds[2:, bounded:] = AWAY, NOTHING
+    bounds[:2, bounded:], bounds[2:, bounded:] = NO_BOUND, NO_MULTIPLIER
     row = Q @ v + f
     e = largest_of_groups(row[line], group[line], len(penalty))
     e = np.where(np.isfinite(e), e, 0.0)

@@ -38,7 +38,7 @@ REPAIRS = 5
 #: curvature of the subproblem of least violation, of the steepest limit
 NEXT_TO_NONE = 1e-6
 #: products and M where no steps are known
-NOTHING = np.zeros((0, 0))
+NO_MATRIX = np.zeros((0, 0))
 #: of how many variables one tells how far a row reaches, where only rounding depends on it
 SPARSE = 64
 
@@ -114,14 +114,14 @@ class WideModel:
             if M is not None:
                 return _WideAround(self, x, reach, sigma, vectors, products, M, scaled=True)
             vectors = vectors[1:half] + vectors[half + 1 :]  # without the oldest
-        return _WideAround(self, x, reach, FLOOR * self._scale * steepest, [], NOTHING, NOTHING, scaled=True)
+        return _WideAround(self, x, reach, FLOOR * self._scale * steepest, [], NO_MATRIX, NO_MATRIX, scaled=True)
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual at x; see `RowModel.residual`."""
         if steepest == 0.0:
             return 0.0
         scale = self._scale
-        anywhere = _WideAround(self, x, (np.inf, np.inf), steepest / scale, [], NOTHING, NOTHING, scaled=False)
+        anywhere = _WideAround(self, x, (np.inf, np.inf), steepest / scale, [], NO_MATRIX, NO_MATRIX, scaled=False)
         program = anywhere.program(own, penalty)
         found = solve(program, self.room)
         K, linear = len(own), self.space.linear
@@ -221,7 +221,7 @@ class _WideAround:
         return SPARSE * np.array([float((np.abs(row[::SPARSE]) * wide).sum()) for row in _stack(rows.slope).rows])
 
     def flat(self, curvature: float) -> "_WideAround":
-        return replace(self, curvature=curvature, learnt=[], products=NOTHING, M=NOTHING)
+        return replace(self, curvature=curvature, learnt=[], products=NO_MATRIX, M=NO_MATRIX)
 
     def program(self, rows: Bundle, penalty: Floats) -> WideProgram:
         """The subproblem of rows, all of them lines."""

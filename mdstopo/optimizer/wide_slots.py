@@ -25,13 +25,13 @@ COST, LOW, HIGH, ITERATE, SLOPE, REACH, KAPPA, FIRST, LAST, RATE = range(SLOTS)
 #: rows of the rooms that the passes below need, each of `ROW` numbers
 ROOM, WHOLE = 13, 4
 #: larger than any multiplier, small enough to be multiplied
-BEYOND = 1e200
+BEYOND_MULTIPLIERS = 1e200
 MAX_STEPS = 200
 #: the last step of Newton's iteration, relative to the width of the variable's box: what the next would correct is
 #: about its square; and the same where the result only tells where to begin
-CLOSE, ROUGH = 3e-7, 0.03
+LAST_STEP, ROUGH_LAST_STEP = 3e-7, 0.03
 #: smaller than any width that counts
-TINY = 1e-300
+LEAST_WIDTH = 1e-300
 
 
 @inline
@@ -132,7 +132,7 @@ def _derivative(
 def bracket_slots(slots: Floats, n: int, power: float, room: Floats, whole: Ints) -> tuple[float, float]:
     """The multipliers between which the variables of the slots are inside their boxes; the least and the largest."""
     first, z, low, high = room[0], room[1], room[2], room[3]
-    least, most = BEYOND, -BEYOND
+    least, most = BEYOND_MULTIPLIERS, -BEYOND_MULTIPLIERS
     for start in range(0, n, BLOCK):
         stop = min(start + BLOCK, n)
         a, c, s = slots[COST, start:stop], slots[ITERATE, start:stop], slots[SLOPE, start:stop]
@@ -142,7 +142,7 @@ def bracket_slots(slots: Floats, n: int, power: float, room: Floats, whole: Ints
         begin, end = slots[FIRST, start:stop], slots[LAST, start:stop]
         for i in range(stop - start):
             if a[i] == 0.0:  # always inside: the multiplier does not move it
-                begin[i], end[i] = -BEYOND, BEYOND
+                begin[i], end[i] = -BEYOND_MULTIPLIERS, BEYOND_MULTIPLIERS
             else:
                 one, other = -low[i] / a[i], -high[i] / a[i]
                 begin[i], end[i] = min(one, other), max(one, other)
@@ -161,13 +161,13 @@ def _evenly(slots: Floats, n: int, x: Floats, multiplier: float, room: Floats) -
         first, last, y, share = slots[FIRST, start:stop], slots[LAST, start:stop], x[start:stop], room[0]
         m = stop - start
         for i in range(m):
-            share[i] = min(max((multiplier - first[i]) / max(last[i] - first[i], TINY), 0.0), 1.0)
+            share[i] = min(max((multiplier - first[i]) / max(last[i] - first[i], LEAST_WIDTH), 0.0), 1.0)
         for i in range(m):
             up = share[i] if a[i] < 0.0 else 1.0 - share[i]
             y[i] = high[i] if up >= 1.0 else (low[i] if up <= 0.0 else low[i] + up * (high[i] - low[i]))
         for i in range(m):
             within = share[i] * (1.0 - share[i]) > 0.0
-            slope -= abs(a[i]) * (high[i] - low[i]) / max(last[i] - first[i], TINY) if within else 0.0
+            slope -= abs(a[i]) * (high[i] - low[i]) / max(last[i] - first[i], LEAST_WIDTH) if within else 0.0
         for i in range(m):
             total += a[i] * y[i]
     return total, slope
@@ -243,7 +243,7 @@ def _solved(
         a[i], low[i], high[i], c[i] = slots[COST, at], slots[LOW, at], slots[HIGH, at], slots[ITERATE, at]
         s[i], unit[i], k[i], y[i] = slots[SLOPE, at], slots[REACH, at], slots[KAPPA, at], x[inside[i]]
     for i in range(n):
-        width[i] = 1.0 / max(high[i] - low[i], TINY)
+        width[i] = 1.0 / max(high[i] - low[i], LEAST_WIDTH)
     for i in range(n):
         unit[i] = (1.0 if s[i] < 0.0 else -1.0) / unit[i]
     for i in range(n):
@@ -291,7 +291,7 @@ def _followed(slots: Floats, n: int, x: Floats, change: float, room: Floats) -> 
         rate, y = slots[RATE, start:stop], x[start:stop]
         m = stop - start
         for i in range(m):
-            step[i] = rate[i] * change / max(high[i] - low[i], TINY)
+            step[i] = rate[i] * change / max(high[i] - low[i], LEAST_WIDTH)
         for i in range(m):
             y[i] = min(max(y[i] - rate[i] * change, low[i]), high[i])
         for i in range(m):
@@ -339,7 +339,7 @@ def root(
     near, far = max(near, min(first, far)), min(far, max(last, near))
     multiplier = guess if near <= guess <= far else 0.5 * (near + far)
     if exact:  # a rough look first, from which nothing is concluded but where to begin
-        total, slope = _exactly(slots, n, x, multiplier, power, ROUGH, room, whole)
+        total, slope = _exactly(slots, n, x, multiplier, power, ROUGH_LAST_STEP, room, whole)
         if slope < 0.0:
             following = min(max(multiplier - (total - goal) / slope, near), far)
             _followed(slots, n, x, following - multiplier, room)
@@ -348,7 +348,7 @@ def root(
     miss, slope, width = 0.0, 0.0, far - near
     for step in range(MAX_STEPS):
         if exact:
-            total, slope = _exactly(slots, n, x, multiplier, power, CLOSE, room, whole)
+            total, slope = _exactly(slots, n, x, multiplier, power, LAST_STEP, room, whole)
         else:
             total, slope = _evenly(slots, n, x, multiplier, room)
         miss = total - goal
@@ -374,7 +374,7 @@ def root(
         width = far - near if step % 3 == 2 else width
         if exact:
             moved, total = _followed(slots, n, x, following - multiplier, room)
-            close = moved <= CLOSE and abs(total - goal) <= rounding
+            close = moved <= LAST_STEP and abs(total - goal) <= rounding
             if close and not _passed(slots, n, multiplier, following):  # to look again would move them by that, squared
                 return following, total - goal, 0, slope
         multiplier = following

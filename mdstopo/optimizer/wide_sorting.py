@@ -21,7 +21,7 @@ from mdstopo.optimizer.wide_slots import BLOCK, ROW, WHOLE, box, enter_slot
 #: variables that move and from which on threads share what is done with them
 CROWD = 50_000
 #: how many variables ahead of a pass their numbers are fetched
-AHEAD = 256
+FETCHED_AHEAD = 256
 #: rows of room, each of `ROW` numbers
 _ROOM = 9
 
@@ -147,9 +147,9 @@ def _moving(
     for start in range(0, n, RUN):
         held, weight = zero(), zero()
         for i in range(start, min(start + RUN, n), lanes()):
-            fetch(c, i + AHEAD)
-            fetch(s, i + AHEAD)
-            fetch(y, i + AHEAD)
+            fetch(c, i + FETCHED_AHEAD)
+            fetch(s, i + FETCHED_AHEAD)
+            fetch(y, i + FETCHED_AHEAD)
             at, cost, push = load(c, i), load(a, i), load(s, i)
             one, other = near * cost, far * cost
             most, least = push + larger(one, other), larger(-1.0 * one, -1.0 * other) - push

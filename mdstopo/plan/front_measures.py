@@ -9,14 +9,14 @@ Bools = NDArray[np.bool_]
 #: the reference point of a front's hypervolume, in objectives scaled to its own ideal and nadir
 REFERENCE = 1.1
 #: relative difference up to which two values of an objective are the same: finer than optima are found
-ALIKE = 1e-6
+SAME_VALUE = 1e-6
 
 
 def dominated(points: Floats) -> Bools:
     """(W,) whether another point is at least as good in every objective and better in one; points (W, m).
 
-    Better is what is lower by more than `ALIKE` of the value: by the last bit nobody is beaten, and equal points do not
-    beat each other. Points that are not finite are dominated.
+    Better is what is lower by more than `SAME_VALUE` of the value: rounding makes no point better, and equal points are
+    no better than each other. Points that are not finite are dominated.
     """
     finite: Bools = np.array(np.isfinite(points).all(axis=1))
     marked: Bools = np.array(~finite)
@@ -29,14 +29,14 @@ def dominated(points: Floats) -> Bools:
 
 
 def repeated(points: Floats) -> Bools:
-    """(W,) whether an earlier point is the same, but for `ALIKE` of its values; points (W, m)."""
+    """(W,) whether an earlier point is the same, but for `SAME_VALUE` of its values; points (W, m)."""
     return np.array([bool(_alike(points[:j], points[j]).all(axis=1).any()) for j in range(len(points))], dtype=np.bool_)
 
 
 def _alike(points: Floats, point: Floats) -> Bools:
-    """(W, m) whether values are the same, but for `ALIKE` of them."""
+    """(W, m) whether values are the same, but for `SAME_VALUE` of them."""
     size = np.maximum(np.abs(points), np.abs(point))
-    return np.asarray(np.abs(points - point) <= ALIKE * size)
+    return np.asarray(np.abs(points - point) <= SAME_VALUE * size)
 
 
 def hypervolume(points: Floats, reference: Floats) -> float:

@@ -23,12 +23,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 #: candidates that enter at once, at most: those that gain, and neighbours that may once these have entered
-MOST = 500
+MOST_ENTERING = 500
 #: candidates of each group that are built to confirm that none would gain
 CONFIRMED = 100
 #: what a violation costs in the search for multipliers, in largest gradient entries, to begin with; and until when it
 #: grows: multipliers must be smaller
-PENALTY, HIGHEST = 1e3, 1e12
+PENALTY, HIGHEST_PENALTY = 1e3, 1e12
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def price(case: Case, of: Problem, x: Floats, count: int | None = None) -> Price
     left: dict[str, float] = {}
     for groups in mirrored_groups(case):
         worth = sum(_worth(case, group, linear) for group in groups)
-        found = problem.candidates_of(groups[0], count).go_through(states, worth, MOST)
+        found = problem.candidates_of(groups[0], count).go_through(states, worth, MOST_ENTERING)
         seen += len(groups) * found.seen + (sum(map(len, groups)) if count is None else 0)
         best = max(best, found.best / scale)
         material = _material(case, groups)
@@ -188,7 +188,7 @@ def _multipliers(problem: "DesignProblem", sample: Sample, x: Floats) -> tuple[f
     penalty = PENALTY * steepest
     while True:
         residual, rows, linear = multipliers(own, x, space, np.full(count, penalty), steepest)
-        if rows[len(sample.rows) :].sum() <= 0.5 * penalty or penalty > HIGHEST * steepest:
+        if rows[len(sample.rows) :].sum() <= 0.5 * penalty or penalty > HIGHEST_PENALTY * steepest:
             return residual, rows, linear
         penalty *= PENALTY
 

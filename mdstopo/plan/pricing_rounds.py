@@ -31,12 +31,12 @@ PATIENCE = 3
 #: them to gain, relative: where an optimum has more of both, its slopes are those of one side of a kink
 ONE_SIDED = 1e-3
 #: the largest gain, in tolerances, up to which prices of laws that switch are confirmed with members that are built
-CLOSE = 10.0
+CLOSE_GAIN = 10.0
 #: columns of the table of rounds in the file
 COLUMNS = ("members", "entered", "left", "objective", "best", "together", "residual", "level")
 #: candidates that the first rounds price, of each group and evenly spread: where an optimum moves far it does so in few
 #: rounds. By how many times more it is once none of these gains much, and up to how much, in tolerances
-COARSE, FINER, LITTLE = 20_000, 32, 100.0
+FIRST_PRICED, PRICED_GROWTH, LITTLE_GAIN = 20_000, 32, 100.0
 
 
 def members_part(case: Case) -> Datasets:
@@ -84,7 +84,7 @@ class Rounds:
         tolerance = self.case.optimizer.tolerance
         fallen = before - state.best_objective
         level = int(self.rows[-1][-1]) if self.rows else 0
-        little = LITTLE * tolerance
+        little = LITTLE_GAIN * tolerance
         while True:
             count = self._count_of(level)
             found = self.last = price(self.case, problem, state.best_alpha, count)
@@ -99,7 +99,7 @@ class Rounds:
         in_vain = len(falls) >= PATIENCE and bool(np.all(falls <= small))
         if count is None:
             self.candidates = found.seen
-            if self._switches and (found.best <= CLOSE * tolerance or in_vain):
+            if self._switches and (found.best <= CLOSE_GAIN * tolerance or in_vain):
                 found = self.last = confirmed(self.case, problem, state.best_alpha, found)
         pairs, staying = self._entered(found, state, fallen > 0.0)
         entered = sum(len(i) for i, _ in found.pairs.values())
@@ -124,7 +124,7 @@ class Rounds:
 
     def _count_of(self, level: int) -> int | None:
         """About how many candidates of each group are priced at a level; None: all."""
-        count = COARSE * FINER**level
+        count = FIRST_PRICED * PRICED_GROWTH**level
         most = max(group.candidates.count for group in self.case.priced_groups if group.candidates is not None)
         return count if count < most else None
 

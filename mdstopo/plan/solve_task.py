@@ -71,7 +71,7 @@ class Task:
         return not state.running or (self.quota is not None and state.iteration >= self.quota)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Found:
     """What a task has found.
 
@@ -124,9 +124,18 @@ def failed(point: int, key: str, alpha: Floats, m: int, reason: str) -> Found:
     """The result of a task that failed."""
     nothing = np.full(m, np.nan)
     return Found(
-        point, key, alpha, nothing, float("nan"), RunStatus.FAILED, reason, 0, float("nan"), float("nan"),
-        np.zeros((0, m)),
-    )  # fmt: skip
+        point=point,
+        key=key,
+        alpha=alpha,
+        objectives=nothing,
+        combined=float("nan"),
+        status=RunStatus.FAILED,
+        reason=reason,
+        evaluations=0,
+        kkt=float("nan"),
+        violation=float("nan"),
+        visited=np.zeros((0, m)),
+    )
 
 
 def solve(
@@ -225,10 +234,19 @@ def _priced(
         status, reason = RunStatus.FAILED, "the design that was found cannot be evaluated in every load case"
     kept = np.array_equal(state.best_alpha, state.alpha)
     return Found(
-        task.point, key, packed(rounds.case, state.best_alpha), objectives, float(state.best_objective), status, reason,
-        evaluations, float(state.kkt) if kept else float("nan"), excess, objectives[None],
+        point=task.point,
+        key=key,
+        alpha=packed(rounds.case, state.best_alpha),
+        objectives=objectives,
+        combined=float(state.best_objective),
+        status=status,
+        reason=reason,
+        evaluations=evaluations,
+        kkt=float(state.kkt) if kept else float("nan"),
+        violation=excess,
+        visited=objectives[None],
         violations=np.array([excess]),
-    )  # fmt: skip
+    )
 
 
 def _is_there(task: Task, state: State) -> bool:
@@ -260,9 +278,19 @@ def _end(engine: Engine, case: Case, task: Task, key: str, state: State) -> Foun
     if status is not RunStatus.FAILED and not np.isfinite(objectives).all():
         status, reason = RunStatus.FAILED, "the design that was found cannot be evaluated in every load case"
     return Found(
-        task.point, key, state.best_alpha, objectives, float(state.best_objective), status, reason,
-        int(state.evaluations), float(state.kkt) if kept else float("nan"), excess, visited, violations=violations,
-    )  # fmt: skip
+        point=task.point,
+        key=key,
+        alpha=state.best_alpha,
+        objectives=objectives,
+        combined=float(state.best_objective),
+        status=status,
+        reason=reason,
+        evaluations=int(state.evaluations),
+        kkt=float(state.kkt) if kept else float("nan"),
+        violation=excess,
+        visited=visited,
+        violations=violations,
+    )
 
 
 def _iterate(engine: Engine, case: Case, task: Task, key: str, state: State) -> Found:
@@ -270,10 +298,19 @@ def _iterate(engine: Engine, case: Case, task: Task, key: str, state: State) -> 
     alpha = state.trial if task.iterate > 0 else state.alpha
     objectives, excess = _final(engine, case, alpha)
     return Found(
-        task.point, key, alpha, objectives, float("nan"), RunStatus.VISITED, f"iterate {task.iterate}",
-        int(state.evaluations) + (task.iterate > 0), float("nan"), excess, np.zeros((0, len(objectives))),
+        point=task.point,
+        key=key,
+        alpha=alpha,
+        objectives=objectives,
+        combined=float("nan"),
+        status=RunStatus.VISITED,
+        reason=f"iterate {task.iterate}",
+        evaluations=int(state.evaluations) + (task.iterate > 0),
+        kkt=float("nan"),
+        violation=excess,
+        visited=np.zeros((0, len(objectives))),
         iterate=task.iterate,
-    )  # fmt: skip
+    )
 
 
 def _final(engine: Engine, case: Case, alpha: Floats) -> tuple[Floats, float]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.plan.front_measures import ALIKE, dominated, scaled
+from mdstopo.plan.front_measures import SAME_VALUE, dominated, scaled
 from mdstopo.plan.solve_task import Found, Task
 
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ Place = tuple[int, int]
 #: of its distance by which it has to be better than each of them in something, lest it lie on the gap's upper side
 GAP, SLIVER = 0.5, 0.1
 #: how far below the line through the front's points a visited design belongs to it however near a point is, in spacings
-DEEP = 0.05
+FAR_BELOW_LINE = 0.05
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,10 @@ def belonging(points: Floats, table: Floats, lowest: Floats, highest: Floats, sp
 
     First those that dominate a point, the best of them first (the least sum of scaled objectives), each in the place of
     all that it dominates. Then those that fill gaps: not dominated, and farther than `GAP` spacings from every point
-    (`_apart`), the farthest first, each a point from then on. Then those that are near a point, but farther than `DEEP`
-    spacings below the line through the points (`_depth`): beside a steep end of the front a design may be near the
-    end and still much better in one objective for little of another. The deepest first, each a point from then on.
+    (`_apart`), the farthest first, each a point from then on. Then those that are near a point, but farther than
+    `FAR_BELOW_LINE` spacings below the line through the points (`_depth`): beside a steep end of the front a design may
+    be near the end and still much better in one objective for little of another. The deepest first, each a point from
+    then on.
     Objectives are scaled so that lowest and highest (m,), utopia and maxima, are 0 and 1.
     """
     front = points[~dominated(points)]
@@ -106,7 +107,7 @@ def belonging(points: Floats, table: Floats, lowest: Floats, highest: Floats, sp
         taken.append(left[k])
         placed = np.concatenate([placed, own[k][None]])
         apart = np.minimum(apart, _apart(own, own[k]))
-    while len(left) and (depth := _depth(own, placed)).max() > DEEP * spacing:
+    while len(left) and (depth := _depth(own, placed)).max() > FAR_BELOW_LINE * spacing:
         k = int(np.argmax(depth))
         taken.append(left.pop(k))
         placed, own = np.concatenate([placed, own[k][None]]), np.delete(own, k, axis=0)
@@ -149,5 +150,5 @@ def _apart(designs: Floats, point: Floats) -> Floats:
 
 
 def _is_reached(values: Floats, front: Floats) -> bool:
-    """Whether a point of the front is no worse in any objective, but for `ALIKE` of it."""
-    return bool((front <= values + ALIKE * np.abs(values)).all(axis=1).any())
+    """Whether a point of the front is no worse in any objective, but for `SAME_VALUE` of it."""
+    return bool((front <= values + SAME_VALUE * np.abs(values)).all(axis=1).any())

@@ -7,7 +7,7 @@ from mdstopo.case.model import GROUND, Case
 from mdstopo.plots.scenery import Floats
 
 #: of the size of the scene: points that are nearer to each other than that are the same
-SAME = 1e-9
+SAME_POINT = 1e-9
 #: points (1/72 inch) that are free between two such members
 FREE = 0.6
 
@@ -26,7 +26,7 @@ def side_places(case: Case, chosen: list[NDArray[np.int64]]) -> list[Floats]:
     if not any(len(some) for some in chosen):
         return [np.zeros(0) for _ in chosen]
     pairs = np.stack([np.concatenate(first), np.concatenate(second)], axis=1)
-    size = SAME * max(float(np.abs(pairs[..., 1:]).max()), 1e-300)
+    size = SAME_POINT * max(float(np.abs(pairs[..., 1:]).max()), 1e-300)
     pairs[..., 1:] = np.round(pairs[..., 1:] / size)
     _, number = np.unique(pairs.reshape(-1, pairs.shape[2]), axis=0, return_inverse=True)
     ends = number.reshape(-1, 2)

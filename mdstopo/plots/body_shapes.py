@@ -17,13 +17,13 @@ from mdstopo.scene.point_positions import points_at
 #: apart where it is closed
 LINE, UNEVEN, CLOSED = 4, 1.6, 1.6
 #: points up to which a line is one only where it is straight: four posts around a scene are no fence
-FEW = 5
+FENCE_POINTS = 5
 #: arms that a body has at most: more would look like members
 MOST_ARMS = 4
 #: of the size of a body: what is nearer to its border than that is not within it; what is nearer to a line is on it
 BORDER = 1e-6
 #: share of the size of all points that a body without points has in pictures, at most
-SMALL = 0.05
+BODY_WITHOUT_POINTS = 0.05
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def followed(points: Floats) -> list[Floats]:
         if k < len(gaps) and gaps[k] <= UNEVEN * gaps[k - 1] and gaps[k - 1] <= UNEVEN * gaps[k]:
             continue
         line = points[first : k + 1]
-        if len(line) > FEW or (len(line) >= LINE and _is_straight(line)):
+        if len(line) > FENCE_POINTS or (len(line) >= LINE and _is_straight(line)):
             is_closed = 0.0 < np.linalg.norm(line[-1] - line[0]) <= CLOSED * gaps[first:k].max()
             found.append(np.concatenate([line, line[:1]]) if is_closed else line)
             first = k + 1 if k < len(gaps) and gaps[k] > gaps[k - 1] else k
@@ -169,6 +169,6 @@ def _disc(case: Case, body: str) -> Floats:
     every = np.concatenate([*others(case, body), np.array([own.position])])
     radius = float(np.sqrt(2.0 * own.inertia / own.mass))
     size = float(np.ptp(every, axis=0).max())
-    radius = min(radius, SMALL * size) if size > 0.0 else radius
+    radius = min(radius, BODY_WITHOUT_POINTS * size) if size > 0.0 else radius
     angle = 2.0 * np.pi * np.arange(48) / 48
     return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -14,7 +14,7 @@ from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.scene.point_positions import points_at
 
 #: how many times larger than what is looked at a scene may be before its far ends are left out of the view
-FAR = 2.0
+FAR_SIZES = 2.0
 
 #: which members (M,) of a group act at a state, by its number
 Acts = Callable[[MemberGroup, int], Mask]
@@ -61,13 +61,13 @@ def scene_cloud(case: Case, states: Floats, solids: Mapping[str, Solid], acts: A
 
 
 def without_far(inner: Floats, *wholes: Floats) -> Floats:
-    """What a picture shows: the first of `wholes` (n, d) that is at most FAR times as large as what is looked at.
+    """What a picture shows: the first of `wholes` (n, d) that is at most FAR_SIZES times as large as what is looked at.
 
     inner (m, d): what is looked at, which is shown alone where none is; where it is a single place, the first of
     `wholes` is shown.
     """
     size = _size(inner)
-    return next((whole for whole in wholes if size == 0.0 or _size(whole) <= FAR * size), inner)
+    return next((whole for whole in wholes if size == 0.0 or _size(whole) <= FAR_SIZES * size), inner)
 
 
 def _size(cloud: Floats) -> float:

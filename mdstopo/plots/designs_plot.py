@@ -18,9 +18,9 @@ from mdstopo.plots.style import WIDTH, difference, ink
 from mdstopo.plots.thickness import FAINT, Thickness, alike, thickness
 
 #: of the largest: a difference that is drawn
-LEAST = 0.05
+DRAWN_DIFFERENCE = 0.05
 #: inches: how high a drawing is at most
-HIGHEST = 2.5
+MOST_HEIGHT = 2.5
 
 
 def draw(module: Any, source: Source) -> Any:
@@ -90,7 +90,7 @@ def _panels(module: Any, stages: list[Stage], rows: int, above: float = 0.0) -> 
 
     above: inches that are free above all of them.
     """
-    most = np.array([WIDTH - LEFT - RIGHT, HIGHEST])
+    most = np.array([WIDTH - LEFT - RIGHT, MOST_HEIGHT])
     inches = np.max([fitted(stage.window(most), most) for stage in stages], axis=0)
     high = float(inches[1]) + BELOW + ABOVE
     figure = module.Figure(figsize=(2.0 * WIDTH, rows * high + above))
@@ -111,11 +111,14 @@ def _more(axis: Any, stage: Stage, thick: Thickness, every: Floats, inches: Floa
     blank = Thickness(tuple(np.zeros_like(share) for share in thick.shares), "")
     stage.draw(axis, q, blank, (None, None), inches, faint=0.5)
     more = np.split(every, np.cumsum([len(group) for group in case.members]))[:-1]
-    drawn = [np.flatnonzero((rise > LEAST) | (share > FAINT)) for rise, share in zip(more, thick.shares, strict=True)]
-    widest = widest_of(int((every > LEAST).sum()))
+    drawn = [
+        np.flatnonzero((rise > DRAWN_DIFFERENCE) | (share > FAINT))
+        for rise, share in zip(more, thick.shares, strict=True)
+    ]
+    widest = widest_of(int((every > DRAWN_DIFFERENCE).sum()))
     for group, some, side, rise in zip(case.members, drawn, side_places(case, drawn), more, strict=True):
         lines, _ = member_lines(case, group, q, stage.seen, some)
-        is_more = rise[some] > LEAST
+        is_more = rise[some] > DRAWN_DIFFERENCE
         add_lines(axis, lines[~is_more], side[~is_more], widest, colors=ink("faint"), linewidths=NARROWEST, zorder=2.0)
         widths = NARROWEST + widest * rise[some][is_more]
         add_lines(axis, lines[is_more], side[is_more], widest, colors=difference(), linewidths=widths, zorder=2.4)

@@ -18,7 +18,7 @@ from mdstopo.plots.thickness import Thickness, thickness
 #: columns of a legend, at most
 COLUMNS = 3
 #: inches: how high a drawing is at most, and a picture; how much a perspective, which has no scale, leaves beside it
-HIGHEST, TALL, MARGINS = 2.4, 10.0, 0.2
+MOST_HEIGHT, MOST_PAGE_HEIGHT, MARGINS = 2.4, 10.0, 0.2
 
 
 def draw(
@@ -62,7 +62,7 @@ def draw(
 def _panel(stage: Stage, count: int) -> Floats:
     """Inches (2,) that each of so many drawings has: as high as what is seen needs."""
     beside = LEFT + RIGHT if stage.case.dimension == 2 else MARGINS
-    most = np.array([WIDTH - beside, min(HIGHEST, TALL / count - BELOW - ABOVE)])
+    most = np.array([WIDTH - beside, min(MOST_HEIGHT, MOST_PAGE_HEIGHT / count - BELOW - ABOVE)])
     return fitted(stage.window(most), most)
 
 

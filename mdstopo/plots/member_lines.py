@@ -21,7 +21,7 @@ HANGING = (0, (3.0, 2.0))
 #: dots of a member that does not act, in its widths
 DOTTED = (0, (1.0, 2.0))
 #: members that are few, and that are many; those that are drawn, the strongest first
-FEW, MANY, MOST = 40, 1000, 20_000
+FEW_MEMBERS, MANY_MEMBERS, MOST_DRAWN = 40, 1000, 20_000
 
 
 def draw_members(
@@ -43,7 +43,7 @@ def draw_members(
     t: the time that is shown, s; None where there is none, for which every member is drawn as one that acts.
     """
     case = source.case
-    chosen = strongest(thick.shares, MOST)
+    chosen = strongest(thick.shares, MOST_DRAWN)
     widest = widest_of(sum(len(each) for each in chosen))
     named = families(case)
     order = list(dict.fromkeys(named))
@@ -112,5 +112,5 @@ def legend_title(case: Case, thick: Thickness) -> str | None:
 
 def widest_of(count: int) -> float:
     """Points: how wide the widest of so many members is, so that they do not cover each other."""
-    share = np.clip(np.log(max(count, 1) / FEW) / np.log(MANY / FEW), 0.0, 1.0)
+    share = np.clip(np.log(max(count, 1) / FEW_MEMBERS) / np.log(MANY_MEMBERS / FEW_MEMBERS), 0.0, 1.0)
     return float(WIDEST + (CROWDED - WIDEST) * share)

@@ -11,7 +11,7 @@ from mdstopo.plots.acting import DOTS, IDLE, acting
 from mdstopo.plots.beside import FREE, side_places, sideways
 from mdstopo.plots.body_shapes import planar_shapes
 from mdstopo.plots.glyphs import Glyph, glyphs
-from mdstopo.plots.member_lines import MOST, NARROWEST, widest_of
+from mdstopo.plots.member_lines import MOST_DRAWN, NARROWEST, widest_of
 from mdstopo.plots.panels import fitted
 from mdstopo.plots.scenery import Floats, edge_at
 from mdstopo.plots.slack import CORNERS, DASHES, THIN, belt_lengths, member_lines
@@ -236,7 +236,7 @@ def _lines(stage: Stage, thick: Thickness, states: Floats, times: list[float | N
 def _members(stage: Stage, thick: Thickness, states: Floats, times: list[float | None]) -> Iterator[_Line]:
     """Lines of members: solid, dashed and thin while they are slack, dotted in grey while they do not act."""
     case = stage.case
-    chosen, named = strongest(thick.shares, MOST), families(case)
+    chosen, named = strongest(thick.shares, MOST_DRAWN), families(case)
     order, widest = list(dict.fromkeys(named)), POINT * widest_of(sum(len(each) for each in chosen))
     looks = [("none", 1.0), (" ".join(map(str, DASHES)), THIN), (" ".join(map(str, DOTS)), 1.0)]
     every = zip(case.members, thick.shares, chosen, side_places(case, chosen), named, strict=True)

@@ -10,14 +10,14 @@ from mdstopo.plots.window import scale_of
 #: inches: left of a drawing, right of it (for the arrow of gravity), below it, above it
 LEFT, RIGHT, BELOW, ABOVE = 0.6, 0.3, 0.4, 0.22
 #: inches (2,): how wide and how high a drawing is at least, for its numbers and names
-LEAST = np.array([1.1, 0.7])
+LEAST_SIZES = np.array([1.1, 0.7])
 
 
 def fitted(box: tuple[Floats, Floats], most: Floats) -> Floats:
     """Inches (2,) of a drawing of a window (its lower left and upper right corner) that is no larger than `most`."""
     low, high = box
     inches = scale_of(low, high, most) / 72.0 * (high - low)
-    return np.clip(inches, np.minimum(LEAST, most), most)
+    return np.clip(inches, np.minimum(LEAST_SIZES, most), most)
 
 
 def add_panel(figure: Any, x: float, y: float, inches: Floats) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from mdstopo.case.model import Case
 
 #: of the size of both scenes: points that are nearer to each other than that are the same
-SAME = 1e-9
+SAME_POINT = 1e-9
 
 
 class _Member(NamedTuple):
@@ -28,7 +28,7 @@ def same_members(first: Case, second: Case) -> list[tuple[int, int]]:
     name without that number, as far as there is no group of the whole name. Groups whose name the other case has not
     are compared with each other by the ends of their members alone.
     """
-    size = SAME * max(*(_size(case) for case in (first, second)), 1e-300)
+    size = SAME_POINT * max(*(_size(case) for case in (first, second)), 1e-300)
     both = [_members(case, size) for case in (first, second)]
     known = [{name for member in own for name in (member.group, family(member.group))} for own in both]
     common = known[0] & known[1]

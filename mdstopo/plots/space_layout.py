@@ -20,7 +20,7 @@ from mdstopo.plots.symbol_marks import Mark, draw_marks, marks_at
 from mdstopo.plots.symbols import symbols
 from mdstopo.plots.thickness import Thickness
 from mdstopo.plots.views import View, views
-from mdstopo.plots.window import AROUND, BEYOND, FREE, places_and_reaches, window
+from mdstopo.plots.window import AROUND, FREE, MOST_BEYOND, places_and_reaches, window
 from mdstopo.scene.point_positions import points_at
 
 #: inches: a page's width, its greatest height; its right margin
@@ -28,9 +28,9 @@ PAGE, TALL, MARGIN = 2.0 * WIDTH, 9.0, 0.1
 #: columns of a legend, at most
 COLUMNS = 6
 #: the least of a panel's sides, in the longest one's
-LEAST = 0.4
+LEAST_SIDE = 0.4
 #: times that the panels are adapted to the scale they have
-ROUNDS = 4
+ADAPTATIONS = 4
 #: inches: the axes' directions in the corner of the perspective
 ARROW = 0.17
 #: colours of the axes x, y, z on a light and on a dark ground
@@ -105,9 +105,9 @@ def _adapted(
     """
     low, high = box
     first, last = box
-    beyond = BEYOND * max(float((high - low).max()), 1e-9)
-    for _ in range(ROUNDS):
-        least = LEAST * max(float((last - first).max()), 1e-9)
+    beyond = MOST_BEYOND * max(float((high - low).max()), 1e-9)
+    for _ in range(ADAPTATIONS):
+        least = LEAST_SIDE * max(float((last - first).max()), 1e-9)
         extent = np.maximum(last - first, least)
         sizes = [float(extent @ np.abs(row)) for row in (seen["front"].across, seen["top"].along, seen["front"].along)]
         places, inches, scale = _arrange(sizes, count, legend)

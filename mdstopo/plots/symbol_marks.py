@@ -13,13 +13,13 @@ from mdstopo.plots.style import ink, paper
 from mdstopo.plots.symbols import Symbol, placed
 
 #: arrows of small loads are not shorter than this share of that of the largest
-SHORTEST = 0.45
+SHORTEST_ARROW = 0.45
 #: below this share of its length a direction points to the eye, or away
 END_ON = 0.2
 #: points between a symbol and that of the ground below it
 BELOW = 0.8
 #: points: how large a symbol is in a legend, and how high, at most
-LARGEST, HIGHEST = 13.0, 10.0
+MOST_SIZE, MOST_HEIGHT = 13.0, 10.0
 #: coordinates on the paper that run to the right and up
 AHEAD = np.ones(2)
 
@@ -80,7 +80,7 @@ def marks_at(
                 glyph = glyphs()["distance"]  # end on: a dot
             angle = float(np.arctan2(flat[1], flat[0]))
         if symbol.kind == "load":
-            scale = max(SHORTEST, abs(symbol.size))
+            scale = max(SHORTEST_ARROW, abs(symbol.size))
         elif symbol.kind in ("motion", "turning"):
             scale = 0.8
         if symbol.size == 0.0:
@@ -121,7 +121,7 @@ def draw_marks(axis: Any, marks: list[Mark]) -> None:
             named.add(mark.label.words)
             path = _all_of(mark.label)
             size = 2.0 * float(np.abs(path.vertices).max())
-            size *= min(1.0, LARGEST / size, HIGHEST / float(np.ptp(path.vertices[:, 1])))
+            size *= min(1.0, MOST_SIZE / size, MOST_HEIGHT / float(np.ptp(path.vertices[:, 1])))
             axis.plot([], [], marker=path, markersize=size, color=ink(), markeredgewidth=0.7,
                       markerfacecolor="none", linestyle="none", label=mark.label.words)  # fmt: skip
 

@@ -13,7 +13,7 @@ from mdstopo.plots.scenery import Floats
 from mdstopo.scene.point_positions import points_at
 
 #: of the largest: what is smaller has no arrow
-TINY = 1e-6
+NO_ARROW = 1e-6
 #: times at which a load that is a formula is sampled for its largest value
 SAMPLES = 201
 #: kinds that change with time
@@ -138,7 +138,7 @@ def _loads(case: Case, chosen: LoadCase, time: float | None) -> Iterator[Symbol]
     }
     for kind, load, value in found:
         size = float(np.linalg.norm(value))
-        acts = size > TINY * largest[kind]
+        acts = size > NO_ARROW * largest[kind]
         axes = load.body if load.frame == "body" else GROUND
         way = (value / size if acts else np.zeros(d)) if kind == "load" or d == 3 else None
         share = float(np.copysign(size / largest[kind], value[0] if way is None else 1.0)) if acts else 0.0

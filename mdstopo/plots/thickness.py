@@ -18,7 +18,7 @@ from mdstopo.plots.style import MOST_NAMED
 #: share of members without any size of their own; of the largest, what is smaller is not drawn
 PLAIN, FAINT = 0.5, 0.02
 #: states of a stored motion, and members, up to which forces are computed
-STATES, MANY = 400, 20_000
+MANY_STATES, MANY_MEMBERS = 400, 20_000
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def thickness(source: Source, alpha: Floats | None = None, largest: float = 0.0)
 
 def _of_final(source: Source, design: Floats, largest: float) -> Thickness:
     case = source.case
-    peaks = stored_peaks(source, design) if case.n_members <= MANY else None
+    peaks = stored_peaks(source, design) if case.n_members <= MANY_MEMBERS else None
     shown, unit = "largest force", " N"
     if peaks is None or not any(np.any(each) for each in peaks):
         peaks, shown, unit = _factors(case, design), "size", ""
@@ -110,11 +110,11 @@ def stored_peaks(source: Source, design: Floats) -> list[Floats] | None:
         stored = source.view.under(f"trajectories/{name}")
         if "q" not in stored or "v" not in stored or not len(stored["q"]):
             return None
-        chosen = np.unique(np.linspace(0, len(stored["q"]) - 1, STATES).astype(int))
+        chosen = np.unique(np.linspace(0, len(stored["q"]) - 1, MANY_STATES).astype(int))
         q, v = stored["q"][chosen], stored["v"][chosen]
         if case.dimension == 2 and len(stored["t"]) > 1:
             between = CubicHermiteSpline(stored["t"], stored["q"], stored["v"])
-            times = np.linspace(stored["t"][0], stored["t"][-1], STATES)
+            times = np.linspace(stored["t"][0], stored["t"][-1], MANY_STATES)
             q, v = np.concatenate([q, between(times)]), np.concatenate([v, between(times, 1)])
         forces = forces_of(case, design, every, q, v)
         if forces is None:

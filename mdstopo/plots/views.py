@@ -10,7 +10,7 @@ from mdstopo.plots.scenery import Floats
 #: where the eye of the perspective is: degrees to the right of the front, and above the horizon
 TURN, RISE = 32.0, 24.0
 #: distance of the eye from the middle, in radii of the scene
-FAR = 4.0
+EYE_DISTANCE = 4.0
 
 
 @dataclass(frozen=True)
@@ -74,5 +74,5 @@ def views(case: Case, middle: Floats, radius: float) -> dict[str, View]:
         "front": View("front", right, up, -away, middle),
         "top": View("top", right, away, up, middle),
         "side": View("side", away, up, right, middle),
-        "perspective": View("perspective", across, np.cross(toward, across), toward, middle, FAR * radius),
+        "perspective": View("perspective", across, np.cross(toward, across), toward, middle, EYE_DISTANCE * radius),
     }

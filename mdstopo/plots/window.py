@@ -13,9 +13,9 @@ FREE, AROUND = 7.0, 1.5
 OUTSIDE = 0.5
 #: sizes of a picture by which the window reaches beyond what is seen, for symbols: in a picture that is hardly larger
 #: than they are no window shows them whole, and without an end it would grow with each round
-BEYOND = 1.5
+MOST_BEYOND = 1.5
 #: times that the window is adapted to the scale it has
-ROUNDS = 12
+ADAPTATIONS = 12
 
 
 def scale_of(low: Floats, high: Floats, inches: Floats) -> float:
@@ -37,8 +37,8 @@ def window(cloud: Floats, marks: Sequence[Mark], inches: Floats) -> tuple[Floats
     some = ((places > low - near) & (places < high + near)).all(axis=1)
     places, reaches = places[some], reaches[some]
     first, last = low, high
-    beyond = BEYOND * 72.0 * inches / scale_of(low, high, inches)
-    for _ in range(ROUNDS):
+    beyond = MOST_BEYOND * 72.0 * inches / scale_of(low, high, inches)
+    for _ in range(ADAPTATIONS):
         room = 1.0 / scale_of(first, last, inches)
         ends = places[:, None] + room * (reaches + AROUND * np.array([[-1.0], [1.0]]))
         first = np.minimum(low - FREE * room, ends[:, 0].min(axis=0, initial=np.inf))

@@ -26,9 +26,9 @@ from mdstopo.report.gltf_file import INDICES, LINES, POINTS, TRIANGLES, VERTICES
 from mdstopo.scene.quaternions import product, quaternions_of
 
 #: members that are drawn, the thickest first
-MOST = 1000
+MOST_MEMBERS = 1000
 #: between two frames no body turns by more (rad); frames of an animation, at least and at most
-TURN, FEWEST, LONGEST = 0.2, 121, 4001
+MOST_TURN, FEWEST_FRAMES, MOST_FRAMES = 0.2, 121, 4001
 #: up to how much turn within a step of the integrator (rad) cubics between its ends may be taken; and by how much of
 #: the scene's size, or of a radian, these may be off
 SMOOTH, CUBIC_ERROR = 0.8, 2e-4
@@ -175,7 +175,7 @@ class _Scene:
         nodes: list[int] = []
         shares, named = thickness(self.source).shares, families(self.case)
         order = list(dict.fromkeys(named))
-        some = strongest(shares, MOST)
+        some = strongest(shares, MOST_MEMBERS)
         every = zip(self.case.members, shares, some, side_places(self.case, some), named, strict=True)
         for group, share, chosen, side, family in every:
             if not len(chosen):
@@ -320,7 +320,7 @@ def _cubics_suffice(case: Case, states: tuple[Floats, Floats, Floats, Floats], a
 def _even(case: Case, t: Floats, v: Floats) -> Floats:
     """Even times from the first to the last of steps, as many as bodies with the rates v need."""
     turned = float((_spins(case, v)[:-1] * np.diff(t)[:, None]).sum(axis=0).max(initial=0.0))
-    count = int(np.clip(np.ceil(turned / TURN) + 1, FEWEST, LONGEST))
+    count = int(np.clip(np.ceil(turned / MOST_TURN) + 1, FEWEST_FRAMES, MOST_FRAMES))
     return np.linspace(t[0], t[-1], count)
 
 

@@ -13,7 +13,7 @@ from mdstopo.limiting.compare import compared, kept_iterates
 from mdstopo.plots.acting import DOTS, IDLE, NOT_ACTING
 from mdstopo.plots.beside import FREE, side_places
 from mdstopo.plots.body_shapes import planar_shapes
-from mdstopo.plots.cloud import FAR
+from mdstopo.plots.cloud import FAR_SIZES
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.objectives_over_time import response_history
@@ -71,7 +71,7 @@ def content(source: Source) -> dict[str, Any]:
         "bodies": _bodies(case),
         "start": _rounded(start_state(case)),
         "symbols": _symbols(case),
-        "far": FAR,
+        "far": FAR_SIZES,
         "hang": {"slack": SLACK, "deepest": DEEPEST, "corners": CORNERS, "down": _rounded(down(case)),
                  "thin": THIN, "dashes": DASHES, "free": FREE * PIXELS,
                  "idle": {"word": NOT_ACTING, "width": IDLE * PIXELS, "dots": DOTS, "colour": ink("middle")}},

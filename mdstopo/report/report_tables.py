@@ -19,7 +19,7 @@ from mdstopo.store.result_reader import ResultView
 #: samples between the neighbours of the largest sample, to find a peak; members that are listed
 FINE, LISTED = 41, 300
 #: of a bound: what is nearer to it is on it
-NOTHING = 1e-12
+ON_BOUND = 1e-12
 
 
 def best_iterate(source: Source) -> int | None:
@@ -76,7 +76,7 @@ def constraint_rows(source: Source) -> list[dict[str, Any]]:
     found = []
     for i, row in enumerate(source.case.constraints):
         start, end = float(excess[0, i]), float(excess[best, i])
-        if abs(end) <= NOTHING * abs(row.bound):
+        if abs(end) <= ON_BOUND * abs(row.bound):
             end = 0.0
         margin = -float(exceeded(row.sense, np.array(end)))
         found.append(

@@ -1,4 +1,4 @@
-"""Whether a point of a sample poses the problem that the case poses: one design and one list of aims fit both."""
+"""Whether a point of a sample poses the same problem as its case: designs and reduced responses are alike."""
 
 from collections.abc import Iterator
 
@@ -61,8 +61,8 @@ def _aims(case: Case, made: Case) -> Iterator[str]:
             yield f"constraints[{i}] limits something else than in the case, or otherwise"
 
 
-def _asked(aim: Objective) -> tuple[object, ...]:
-    return _seen(aim.response), aim.over_time, aim.load_case, aim.sense
+def _asked(objective: Objective) -> tuple[object, ...]:
+    return _seen(objective.response), objective.over_time, objective.load_case, objective.sense
 
 
 def _limited(row: VolumeRow | ResponseRow) -> tuple[object, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mdstopo.case.model import Case, Objective, ResponseRow
+from mdstopo.case.model import Case, Objective, ReducedResponse, ResponseRow
 from mdstopo.case.objects.uncertain import Measure
 from mdstopo.case.responses.response_units import constrained
 from mdstopo.design_problem import sign_of
@@ -137,7 +137,7 @@ def _trials(case: Case, fresh: Sample, alpha: FloatArray, workers: PointWorkers 
 
 def _robust(
     name: str,
-    of: Objective | ResponseRow,
+    of: ReducedResponse,
     measure: Measure,
     *,
     nominal: float,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.case.model import Case, Objective, ResponseRow
+from mdstopo.case.model import Case, ReducedResponse, ResponseRow
 from mdstopo.case.objects.uncertain import Measure
 from mdstopo.design_problem import competes, sign_of
 from mdstopo.engine import Evaluator
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 #: the nominal case's place among the points
 NOMINAL = -1
 #: numbers in the gradients of all peaks of one objective at all points, at most, where more peaks are asked for
-ROOM = 20_000_000
+ROOM_FOR_GRADIENTS = 20_000_000
 #: where there is not room for so many peaks of a point, it is asked for its usual ones
-FEWEST = 8
+FEWEST_PEAKS = 8
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,8 @@ class Ensemble(Evaluator):
         """The rows that each point is asked for: those that its measures can use and memory has room for."""
         if rows.most is None or not self._of_peaks:
             return USUAL
-        room = ROOM // (len(self.points) * max(self.case.space.length, 1))
-        return Rows(rows.window, min(rows.most, room)) if room >= FEWEST else USUAL
+        room = ROOM_FOR_GRADIENTS // (len(self.points) * max(self.case.space.length, 1))
+        return Rows(rows.window, min(rows.most, room)) if room >= FEWEST_PEAKS else USUAL
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
         """What `evaluate` found, and estimates of its errors: those of the points, weighted as the measure does.
@@ -257,7 +257,7 @@ class Ensemble(Evaluator):
         return all_peaks
 
     def _measured(
-        self, of: Objective | ResponseRow, measure: Measure, found: Mapping[int, tuple[Peak, ...]], sign: float
+        self, of: ReducedResponse, measure: Measure, found: Mapping[int, tuple[Peak, ...]], sign: float
     ) -> tuple[Peak, ...]:
         # what bounds a value from the good side is no row: the value itself stands for it
         own = {i: peaks if competes(of, sign) else peaks[:1] for i, peaks in found.items()}

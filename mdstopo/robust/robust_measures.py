@@ -152,7 +152,7 @@ class Quantile(Statistic):
     def rows(
         self, measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float, asked: Rows
     ) -> tuple[Peak, ...]:
-        """The peaks of the points that do not exceed it."""
+        """The peaks of the points whose values are no larger than the quantile."""
         y = sign * np.array([part[0].value for part in parts])
         found = [peak for s in np.sort(self.ranked(measure, y, p)).tolist() for peak in parts[s]]
         found.sort(key=lambda peak: -sign * peak.value)

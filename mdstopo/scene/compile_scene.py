@@ -77,7 +77,7 @@ class Scene:
 
 
 #: share of the longest member by which bodies may have moved for elongations to come from displacements
-NEAR = 0.01
+NEAR_HOME = 0.01
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def near_of(group: MemberGroup, second_ends: FloatArray, in_rows: bool) -> list[
 
     In grids, whose kernels do not ask which is shorter, no end has moved by more than half of the shortest member.
     """
-    far = NEAR * float(group.length.max())
+    far = NEAR_HOME * float(group.length.max())
     if in_rows:
         far = min(far, 0.25 * float(group.length.min()))
     reach = float(np.hypot(*second_ends.T).max())

@@ -19,7 +19,7 @@ NARROWEST = 2 * WIDE
 #: weighs members of grids and others by the same share), and padding costs memory and the passes that know no grids too
 WASTE = 1.25
 #: rows at least, whose sums a column shares
-FEWEST = 4
+FEWEST_ROWS = 4
 #: vectors of several rows at least that have their columns in common
 TOGETHER = 2
 #: a stride of so many numbers puts all rows into the same few lines of a cache
@@ -33,7 +33,7 @@ def row_of(group: MemberGroup, elastic: bool) -> tuple[int, int]:
     width = -(-length // WIDE) * WIDE
     if width % STRIDE == 0:
         width += WIDE
-    few = len(group) < FEWEST * length
+    few = len(group) < FEWEST_ROWS * length
     if not elastic or few or not NARROWEST <= width <= min(WASTE * length, CHUNK):
         return 0, 0
     return (width, length) if _is_grid(group, length) else (0, 0)

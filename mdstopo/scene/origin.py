@@ -39,7 +39,7 @@ from mdstopo.scene.bodies import distances, placed
 from mdstopo.scene.springs_model import FloatArray
 
 #: the grid of origins is at least so many times as wide as half the scene
-WIDER = 4.0
+GRID_WIDER = 4.0
 
 #: a point, x and y in a plane, x, y and z in space
 Point = tuple[float, ...]
@@ -54,7 +54,7 @@ def origin_of(case: Case) -> Point:
     half = 0.5 * float((high - low).max())
     if half == 0.0:
         return (0.0,) * len(low)  # one body that nothing is tied to
-    grid = 2.0 ** math.ceil(math.log2(WIDER * half))
+    grid = 2.0 ** math.ceil(math.log2(GRID_WIDER * half))
     return tuple(grid * round(middle / grid) for middle in (0.5 * low + 0.5 * high).tolist())
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from mdstopo.scene.springs_model import FloatArray
 
 #: components of a unit quaternion up to this size are rounding's: they do not choose its sign
-NOUGHT = 1e-14
+ROUNDED_COMPONENT = 1e-14
 
 
 def principal(inertia: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -48,7 +48,7 @@ def quaternions_of(rotations: FloatArray) -> FloatArray:
         q = products[best].copy()
         q[best] = squares[best]
         q /= np.linalg.norm(q)
-        first = q[np.abs(q) > NOUGHT][0]
+        first = q[np.abs(q) > ROUNDED_COMPONENT][0]
         out[k] = q if first > 0.0 else -q
     return out.reshape(*np.shape(rotations)[:-2], 4)
 

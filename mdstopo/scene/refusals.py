@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from mdstopo.case.methods.integrators import INTEGRATORS
 from mdstopo.case.methods.sensitivities import chosen, having
-from mdstopo.case.model import Case, MemberGroup, Objective, Response, ResponseRow, VolumeRow
+from mdstopo.case.model import Case, MemberGroup, ReducedResponse, Response, ResponseRow, VolumeRow
 from mdstopo.case.scene.candidates import mirrored_groups
 from mdstopo.case.text.errors import Mistake
 from mdstopo.case.text.words import listed, number_text, shown
@@ -80,7 +80,7 @@ def _several_members(case: Case, name: str, path: str) -> Iterator[tuple[str, st
         yield path, f"found {shown(name)} with {count} members; allowed in an expression are groups of one member"
 
 
-def rows_of_responses(case: Case) -> Iterator[tuple[str, Objective | ResponseRow]]:
+def rows_of_responses(case: Case) -> Iterator[tuple[str, ReducedResponse]]:
     """The objectives, and the constraints on responses, with their key paths."""
     yield from ((f"objectives.{each.name}", each) for each in case.objectives)
     for i, row in enumerate(case.constraints):

@@ -17,14 +17,14 @@ from mdstopo.scene.origin import Point, seen_from
 from mdstopo.scene.springs_model import FloatArray
 
 #: the other point is so far away, of the scene's size: coordinates stay as large as they are
-APART = 0.05, 0.2
+FAR_POINT = 0.05, 0.2
 
 
 def rounded_otherwise(case: Case, origin: Point, size: float, sample: int) -> Case:
     """The same case with other rounding: in coordinates from a point near `origin`, its numbers changed in the last
     digit; sample: which, from 1."""
     random = np.random.default_rng(sample)
-    apart = (size * random.uniform(*APART, len(origin))).tolist()
+    apart = (size * random.uniform(*FAR_POINT, len(origin))).tolist()
     moved = seen_from(case, tuple(zero + away for zero, away in zip(origin, apart, strict=True)))
     return replace(moved, members=tuple(_nudged(group, random) for group in moved.members))
 

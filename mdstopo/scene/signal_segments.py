@@ -11,7 +11,7 @@ from mdstopo.case.model import Load, LoadCase, Signal, Table
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: times closer than this, relative to the whole, are no further ends of segments
-APART = 1e-10
+TIMES_APART = 1e-10
 
 
 class Loaded(Protocol):
@@ -81,7 +81,7 @@ def _nearness(start: float, end: float) -> float:
 def cut_segments(model: LoadedModel, times: Sequence[float]) -> LoadedModel:
     """The model with further times at which segments end; its loads are the same functions of time as before."""
     old = model.times
-    apart = APART * float(old[-1] - old[0])
+    apart = TIMES_APART * float(old[-1] - old[0])
     asked = np.sort(np.asarray(times, dtype=np.float64))
     behind = np.clip(np.searchsorted(old, asked), 1, len(old) - 1)
     far = np.minimum(np.abs(asked - old[behind - 1]), np.abs(old[behind] - asked)) > apart

@@ -20,7 +20,7 @@ from mdstopo.mechanics.kinematics.planar_poses import POSE, copy_rows, pair_disp
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.mechanics.passes import SUM_T, SUMS, design_of_members, springs_of
 from mdstopo.responses.energy import energy_at, energy_slope
-from mdstopo.scene.compile_scene import NEAR
+from mdstopo.scene.compile_scene import NEAR_HOME
 from mdstopo.scene.packing import unpack
 from mdstopo.scene.springs_model import (
     BLOCK,
@@ -73,7 +73,7 @@ TILE_NUMBERS = 5
 ) = range(10)
 COMMON = 10
 #: prices are below it
-FAR = 1e300
+ABOVE_ALL_PRICES = 1e300
 #: `row_poses` needs more room
 NO_ROOM = -1
 
@@ -400,7 +400,7 @@ def _fill_members(points, row, column, rows, columns, free, member, near):
             else:
                 store(member[L0], at, zero() + free)
                 store(member[EXCESS], at, (length - free) * (length + free))
-    distance = min(NEAR * largest(longest), -0.25 * largest(shortest))
+    distance = min(NEAR_HOME * largest(longest), -0.25 * largest(shortest))
     reach = math.sqrt(largest(far))
     near[0] = distance * distance
     near[1] = min(distance / max(reach, 1e-300), 1.0) ** 2
@@ -445,11 +445,11 @@ def sum_tile(price, home, common, out):
         length = load(home, at)
         found = load(price, at)
         cost = length if common[COST] < 0.0 else zero() + common[COST]
-        counts = where_larger(zero() - found, -FAR, zero() + 1.0)
+        counts = where_larger(zero() - found, -ABOVE_ALL_PRICES, zero() + 1.0)
         counts = where_larger(length, common[BELOW], where_larger(zero() - length, -common[ABOVE], counts))
         gain = where_larger(counts, 0.5, zero() - (found + common[WORTH] * cost))
         seen += counts
-        best = larger(gain + FAR * (counts - 1.0), best)
+        best = larger(gain + ABOVE_ALL_PRICES * (counts - 1.0), best)
         gains += larger(gain, zero())
         inverse = inverse_root(cost * cost, ZERO_LENGTH_SQUARED)
         ratio = larger(gain * inverse, ratio)

@@ -27,7 +27,7 @@ class SpringsDriver(Driver):
     """One scene of springs between free bodies, ready to run; `integrators.scene_driver.SceneDriver` tells how."""
 
     def __init__(self, case: Case, scene: Scene, options: DriverOptions) -> None:
-        kinds = [REDUCTIONS[each.over_time] for each in options.aims]
+        kinds = [REDUCTIONS[each.over_time] for each in options.responses]
         reductions = np.array([resolve_name(kind.springs) for kind in kinds], dtype=np.int64)
         integrated = any(kind.is_integral for kind in kinds)
         super().__init__(scene, options, _response_entries, reductions, integrated)

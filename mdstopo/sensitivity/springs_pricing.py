@@ -11,7 +11,7 @@ from mdstopo.case.scene.candidates import lengths_between
 from mdstopo.compiler.threads import allowed
 from mdstopo.integrators.steps import FIRST, WORK, carve
 from mdstopo.mechanics.kinematics.planar_poses import POSE
-from mdstopo.scene.compile_scene import NEAR
+from mdstopo.scene.compile_scene import NEAR_HOME
 from mdstopo.scene.springs_model import (
     DAMPING,
     EXCESS,
@@ -142,7 +142,7 @@ class SpringCandidates(CandidatePass[SpringPricingStates]):
             here[EXCESS] = (length - here[L0]) * (length + here[L0])
             here[[STIFFNESS, DAMPING, PRELOAD]] = np.array([law.stiffness, law.damping, law.preload])[:, None]
             member[:STIFFNESS, count:] = member[:STIFFNESS, count - 1 : count]  # no place has a length of its own
-            far = NEAR * float(length.max())
+            far = NEAR_HOME * float(length.max())
             near = np.array([[far**2, min(far / max(self._far, 1e-300), 1.0) ** 2]])
             kernels.price_members(member, self._kind, near, *own, out)
             found[part] = out[:count]

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.model import GROUND, Case, FloatArray, Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import GROUND, Case, FloatArray, Objective, ReducedResponse, ResponseRow, VolumeRow
 from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.scene.moving_volumes import spent
 from mdstopo.scene.point_positions import seats_at
@@ -15,7 +15,7 @@ from mdstopo.store.contents import Motion
 Floats = NDArray[np.float64]
 
 _USED = 0.9  # share of a volume limit below which it is far from active
-_LARGER = 1.05  # ratio of relative motions from which one exceeds the other
+_LARGER = 1.05  # ratio of two relative motions from which on the larger one is told
 #: share of the scene's size, or of a radian, by which prescribed motions of two designs differ at most
 _SAME = 1e-6
 #: share of an objective by which a variable changes it, across its whole range, where the slope is rounding alone
@@ -106,9 +106,9 @@ def _prescribed(before: Motion, after: Motion) -> bool:
 
 def is_held(case: Case, load_case: str) -> bool:
     """Whether a displacement or an angle is limited, or minimised, in this load case."""
-    aims: list[Objective | ResponseRow] = [*_minimised(case)]
-    aims += [row for row in case.constraints if isinstance(row, ResponseRow) and row.sense in ("limit", "equals")]
-    return any(each.load_case == load_case and kind_of(each.response).is_position for each in aims)
+    responses: list[ReducedResponse] = [*_minimised(case)]
+    responses += [row for row in case.constraints if isinstance(row, ResponseRow) and row.sense in ("limit", "equals")]
+    return any(each.load_case == load_case and kind_of(each.response).is_position for each in responses)
 
 
 def _minimised(case: Case) -> list[Objective]:

@@ -7,9 +7,9 @@ from mdstopo.integrators.steps import TURN
 from mdstopo.store.contents import Motion
 
 #: steps to a period, or for the whole motion, below which it is hardly seen
-FEWEST = 10.0
+STEPS_PER_PERIOD = 10.0
 #: share of the largest speed of its kind below which a swing is of no interest
-SMALL = 0.05
+SMALL_SWING = 0.05
 
 
 def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
@@ -24,7 +24,7 @@ def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
     if step is None or not motion.status.ok or len(motion.t) < 2:
         return ""
     where = f"in load case {load_case} " if len(case.load_cases) > 1 else ""
-    if motion.t[-1] - motion.t[0] < FEWEST * step * (1.0 - 1e-9):
+    if motion.t[-1] - motion.t[0] < STEPS_PER_PERIOD * step * (1.0 - 1e-9):
         return f"solver.step of {step:g} s: {where}the motion has fewer than ten steps"
     each = motion.v.shape[1] // len(case.bodies)
     if turning := _turns_too_far(case, motion, each, step):
@@ -33,10 +33,10 @@ def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
     shortest, mover = np.inf, ""
     for column in range(motion.v.shape[1]):
         largest = float(np.abs(motion.v[:, kinds == kinds[column]]).max())
-        found = _half_period(motion.t, motion.v[:, column], motion.a[:, column], SMALL * largest)
+        found = _half_period(motion.t, motion.v[:, column], motion.a[:, column], SMALL_SWING * largest)
         if found < shortest:
             shortest, mover = found, case.bodies[column // each].name
-    if 2.0 * shortest >= FEWEST * step:
+    if 2.0 * shortest >= STEPS_PER_PERIOD * step:
         return ""
     return (
         f"solver.step of {step:g} s: {where}the velocity of {mover} swings with a period of some {2.0 * shortest:.2g} "

@@ -21,14 +21,14 @@ from mdstopo.case.model import Case
 from mdstopo.children import command, end_with_parent
 from mdstopo.compiler.store import cache_folder, is_kept
 from mdstopo.evaluators import evaluator_of
-from mdstopo.optimizer.wide import MANY
-from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.optimizer.wide import MANY_VARIABLES
+from mdstopo.optimizer.wide_numbers import VERY_MANY_VARIABLES
 from mdstopo.plan.pricing import price
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.scene.refusals import refusals
 from mdstopo.starts.evaluator_interface import equal_weights, problem_of
-from mdstopo.starts.getting_ready import FEW, get_ready, load_optimizer, motions
+from mdstopo.starts.getting_ready import FEW_VARIABLES, get_ready, load_optimizer, motions
 from mdstopo.warm import compilation_due, compiling, needs_general, tiny
 
 #: the words that have a process compile what evaluates steps, with the optimiser and without it, and what makes steps
@@ -121,7 +121,7 @@ def _end(child: subprocess.Popen[bytes]) -> None:
 def compile_in_background() -> None:
     """Compile the optimiser for few variables: the share of the second process (`mdstopo.warm`) where a case has
     many."""
-    load_optimizer(tiny("auto"), FEW)
+    load_optimizer(tiny("auto"), FEW_VARIABLES)
 
 
 def _marker(case: Case) -> Path:
@@ -129,7 +129,7 @@ def _marker(case: Case) -> Path:
     include_kernels(case)
     family = "general" if beyond_springs(case) else "springs"
     family += "-priced" if case.priced_groups else ""
-    family += "".join(f"-{many}" for many in (MANY, WIDE) if case.space.size >= many)
+    family += "".join(f"-{many}" for many in (MANY_VARIABLES, VERY_MANY_VARIABLES) if case.space.size >= many)
     return cache_folder() / f"ready-{family}-{case.solver.integrator}-{case.solver.sensitivity}"
 
 
@@ -162,18 +162,18 @@ def _compile_back(case: Case) -> None:
     finds on the disk.
     """
     engine = evaluator_of(case, in_background=False)
-    load_optimizer(case, FEW)
+    load_optimizer(case, FEW_VARIABLES)
     if getattr(problem_of(engine, equal_weights(case)), "competes", False):
-        load_optimizer(case, FEW, competes=True)
+        load_optimizer(case, FEW_VARIABLES, competes=True)
     engine.compile_responses()
 
 
 def _compile_all(case: Case) -> None:
     """Compile what the case needs, and note that it is there."""
-    many = case.space.size >= MANY
+    many = case.space.size >= MANY_VARIABLES
     engine = evaluator_of(case, share=["mdstopo.session.compiling_apart"] if many else [])
     if many:
-        load_optimizer(case, MANY)
+        load_optimizer(case, MANY_VARIABLES)
     if beyond_springs(case):
         engine.compile_steps()
         motions(case, engine, case.start)  # what the other process compiles last comes last here

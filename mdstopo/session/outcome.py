@@ -1,6 +1,6 @@
 """What a run tells while it goes and when it ends."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from mdstopo.optimizer.state import State
 from mdstopo.plan.pricing import Pricing
 from mdstopo.session.start_in_stages import iterations_of
 from mdstopo.shown import counted, html_of
+from mdstopo.starts.callbacks import Notify
 from mdstopo.status import RunStatus
 
 if TYPE_CHECKING:
@@ -59,6 +60,19 @@ class Progress:
             evaluations=int(state.evaluations),
             failure=history.failure[-1],
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Callbacks:
+    """What a run asks and tells its caller.
+
+    on_iteration: called after each iteration. stop_requested: asked after each iteration whether to stop. notify: is
+    given sentences for the user.
+    """
+
+    on_iteration: Callable[[Progress], None]
+    stop_requested: Callable[[], bool]
+    notify: Notify
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ JUMPS = (
     "has settled, and choose bounds that keep it where it should be"
 )
 #: constraints that are named, and the least share of the Lagrangian's gradient that one has
-NAMED, SHARE = 3, 1e-2
+MOST_NAMED, LEAST_SHARE = 3, 1e-2
 
 
 def stalled_run(case: Case, state: State) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ def holders(case: Case, state: State) -> list[str]:
             shares[whose[group]] = shares.get(whose[group], 0.0) + weight
     total = sum(shares.values())
     order = sorted((index for index in shares if index >= 0), key=lambda index: (-shares[index], index))
-    named = [index for index in order if shares[index] > SHARE * total][:NAMED]
-    competing = int(np.count_nonzero((groups == 0) & (weights > SHARE * total)))
+    named = [index for index in order if shares[index] > LEAST_SHARE * total][:MOST_NAMED]
+    competing = int(np.count_nonzero((groups == 0) & (weights > LEAST_SHARE * total)))
     peaks = f" ({competing} rows compete)" if competing > 1 else ""
     return [f"the objective{peaks}", *(f"constraints[{i}] ({constrained(case, case.constraints[i])})" for i in named)]

@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 
 #: so many choices are all evaluated, where nothing varies beside them: a search takes hundreds of evaluations or more,
 #: with gradients
-FEW = 5000
+FEW_CHOICES = 5000
 #: evaluations after which the search ends with the best so far, and says that nodes are left
 MOST_EVALUATIONS = 50_000
 #: how near to a size, as a share of the way to the next one, a number counts as it
@@ -199,7 +199,7 @@ class SizeSearch:
         seen: is given it after each node and after each choice that is tried where there are no nodes.
         """
         progress = self.progress
-        if self._catalogued.choices <= FEW and not len(self._others):
+        if self._catalogued.choices <= FEW_CHOICES and not len(self._others):
             self._try_all(stop, seen)
         while self._open and not progress.exhaustive and not stop() and self._counts[0] < MOST_EVALUATIONS:
             node = heapq.heappop(self._open)

@@ -226,7 +226,7 @@ class Sizes:
 
     def part(self) -> Datasets:
         """The datasets that a file keeps of the search, and before its end the best choice as the design."""
-        if self._search is None:  # of a run that is opened again: as it was
+        if self._search is None:  # nothing was searched in this process: keep what an earlier one has found
             return {} if self._before is None else _catalogue_part(self._before)
         progress = self._search.progress
         part: Datasets = {f"{SEARCH}/{name}": array for name, array in self._search.to_arrays().items()}
@@ -258,7 +258,7 @@ class Sizes:
         kept = [place for place in groups if x[place] >= KEPT * least[place]]
         choices = math.prod(len(group.sizes) for group in groups.values())
         alone = set(np.flatnonzero(problem.upper > problem.lower).tolist()) <= set(groups)
-        everyone = choices <= size_search.FEW and alone and (len(kept) > 0 or not problem.linear.equal.any())
+        everyone = choices <= size_search.FEW_CHOICES and alone and (len(kept) > 0 or not problem.linear.equal.any())
         return np.array(sorted(groups if everyone else kept), dtype=np.int64)
 
     def _more(self, problem: Problem, x: Floats, kept: Ints, progress: SearchProgress) -> Ints:

@@ -1,5 +1,10 @@
 """Callbacks that do nothing, for callers who want none."""
 
+from collections.abc import Callable
+
+#: is given sentences for the user
+Notify = Callable[[str], None]
+
 
 def ignore(_: object) -> None:
     """A callback that does nothing."""

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.optimizer.problem import LinearRows, Problem, Sample
-from mdstopo.optimizer.wide import MANY
-from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.optimizer.wide import MANY_VARIABLES
+from mdstopo.optimizer.wide_numbers import VERY_MANY_VARIABLES
 from mdstopo.starts.evaluator_interface import Engine
 from mdstopo.starts.single_start import first_design, make_optimizer
 from mdstopo.store.contents import Motion
 
 Floats = NDArray[np.float64]
 
-FEW = 3
+FEW_VARIABLES = 3
 """Variables of the smallest problem."""
 _SMALL = 100_000  # members up to which an evaluation costs nothing beside loading its kernels
 
@@ -32,10 +32,13 @@ def get_ready(
     case. Raises CaseError where no design keeps the rows.
     """
     competes = bool(getattr(problem, "competes", False))
-    for size in [FEW, *(many for many in (MANY, WIDE) if len(problem.initial) >= many)]:
-        load_optimizer(case, size, size >= WIDE and competes)
+    for size in [
+        FEW_VARIABLES,
+        *(many for many in (MANY_VARIABLES, VERY_MANY_VARIABLES) if len(problem.initial) >= many),
+    ]:
+        load_optimizer(case, size, size >= VERY_MANY_VARIABLES and competes)
     if competes:
-        load_optimizer(case, FEW, competes)
+        load_optimizer(case, FEW_VARIABLES, competes)
     stated, begin = first_design(case, problem, initial)
     before = motions(case, engine, case.space.expand(begin))
     if case.n_members <= _SMALL:
@@ -67,7 +70,7 @@ class _Toy:
         self.upper = np.ones(size)
         self.linear = LinearRows(np.ones((1, size)), np.array([0.5 * size]), np.array([True]))
         rising = np.linspace(1.0, 3.0, size)
-        self._slopes = np.array([rising, rising[::-1] if size < MANY else 0.9 * rising])
+        self._slopes = np.array([rising, rising[::-1] if size < MANY_VARIABLES else 0.9 * rising])
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows and their slopes."""

@@ -30,11 +30,11 @@ TRIAL, SECOND_TRIAL, LAGGING = 3, 5, 1.0 / 3.0
 #: iterations after which those are dropped that come to the same as another one
 LOOKS, LATER_LOOKS = (SECOND_TRIAL, 6, 7, 8, 9, 10, 12, 14, 16, 18), tuple(range(22, 40, 2))
 #: iterations after which it is decided who goes on; the share of the starts that do
-QUOTAS, SHARE = (20, 40), 1.0 / 3.0
+QUOTAS, SHARE_GOING_ON = (20, 40), 1.0 / 3.0
 #: a start that has fallen by this share of U within so many iterations goes on, too
 FALLING, LATELY = 0.1, 5
-#: a start whose U is higher than the best by more than this share of it does not
-BEHIND = 1.0
+#: a start whose U is higher than the best by more than this share of the best does not go on
+FAR_BEHIND = 1.0
 #: two designs are one optimum where U differs by less than this, relative, and alpha by less than that on average
 SAME_VALUE, SAME_DESIGN = 1e-3, 2e-2
 #: two starts come to one optimum where so are the designs that they go to next, and the values foreseen there differ by
@@ -185,7 +185,7 @@ def drop_twins(
         if twin < 0 or not state.running:
             kept.append((index, state))
         else:
-            states[index] = marked = _dropped(state, SAME, twin)
+            states[index] = marked = _dropped(state, SAME_OPTIMUM, twin)
             keep(index, marked)
 
 
@@ -204,7 +204,7 @@ def lags(state: State, best: State, tolerance: float) -> bool:
 
 
 #: why a start is dropped that has a twin
-SAME = "another start came to the same"
+SAME_OPTIMUM = "another start came to the same"
 
 
 def _dropped(state: State, why: str, twin: int = -1) -> State:
@@ -232,7 +232,7 @@ def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, Stat
     if any(state.iteration > quota for _, state in begun):
         return
     order = sorted(begun, key=lambda each: (*rank(each[1], tolerance), each[0]))
-    most = max(1, math.ceil(SHARE * len(states)))
+    most = max(1, math.ceil(SHARE_GOING_ON * len(states)))
     kept: list[tuple[int, State]] = []
     for index, state in order:
         twin = twin_of(state, kept)
@@ -240,7 +240,7 @@ def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, Stat
         if twin < 0 and good:
             kept.append((index, state))
         elif state.running:
-            states[index] = marked = _dropped(state, SAME if twin >= 0 else "other starts were better", twin)
+            states[index] = marked = _dropped(state, SAME_OPTIMUM if twin >= 0 else "other starts were better", twin)
             keep(index, marked)
 
 
@@ -271,7 +271,7 @@ def near(state: State, best: State, tolerance: float) -> bool:
     """Whether a start may still become the best: it does not keep all limits yet, or its U is not far above."""
     if best.best_violation > tolerance or state.best_violation > tolerance:
         return True
-    return state.best_objective - best.best_objective <= BEHIND * abs(best.best_objective)
+    return state.best_objective - best.best_objective <= FAR_BEHIND * abs(best.best_objective)
 
 
 def falls(state: State, lately: int = LATELY) -> bool:
@@ -367,4 +367,11 @@ def _found(states: Sequence[State | None], group: Sequence[int]) -> Found:
     own = [state for index in group if (state := states[index]) is not None]
     best = own[0]
     evaluations = sum(state.evaluations for state in own)
-    return Found(best.best_objective, best.best_plain, tuple(sorted(group)), evaluations, best.status, best.kkt)
+    return Found(
+        objective=best.best_objective,
+        violation=best.best_plain,
+        starts=tuple(sorted(group)),
+        evaluations=evaluations,
+        status=best.status,
+        kkt=best.kkt,
+    )

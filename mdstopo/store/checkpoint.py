@@ -3,6 +3,8 @@
 import time
 from collections.abc import Callable
 
+from mdstopo.store.store_errors import WriteError
+
 INTERVAL = 0.4
 """Seconds of work after which a checkpoint is due: with its own writing, about half a second can be lost."""
 
@@ -20,6 +22,9 @@ class Checkpointer:
         seconds that the first one is expected to take; afterwards the last one's is used.
     clock
         a clock in seconds.
+    notify
+        is given a sentence where a checkpoint could not be written, and the work goes on: there may be room on the disk
+        at its end. None lets the WriteError through.
     """
 
     def __init__(
@@ -27,8 +32,10 @@ class Checkpointer:
         save: Callable[[], None],
         expected_cost: float = 0.0,
         clock: Callable[[], float] = time.perf_counter,
+        notify: Callable[[str], None] | None = None,
     ) -> None:
         self._save = save
+        self._notify = notify
         self._cost = expected_cost
         self._clock = clock
         self._saved_at = clock()
@@ -48,7 +55,12 @@ class Checkpointer:
         early = unsaved + iteration < INTERVAL or unsaved < _COST_FACTOR * self._cost
         if early and not (urgent and self._cost < INTERVAL):
             return False
-        self._save()
+        try:
+            self._save()
+        except WriteError as error:
+            if self._notify is None:
+                raise
+            self._notify(f"no checkpoint: {error}")
         self._saved_at = self._offered_at = self._clock()
         self._cost = self._saved_at - now
         self.count += 1

@@ -4,6 +4,7 @@ Each function gives a part of the file as {path: value}; `image.encode` turns th
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ from mdstopo.store.image import Attribute, Value, encode, texts
 from mdstopo.store.labels import labels
 from mdstopo.store.provenance import Provenance
 from mdstopo.store.same_case import describe
+from mdstopo.store.set_keys import set_keys
 
 FORMAT = 1
 
@@ -107,34 +109,55 @@ def sensitivity_part(
     return part
 
 
-def result_image(
-    case: Case,
-    kind: str,
-    status: str,
-    reason: str,
-    datasets: Datasets,
-    provenance: Provenance,
-    settings: Mapping[str, Attribute],
-    warnings: tuple[str, ...] = (),
-) -> bytes:
-    """A whole result file, as bytes.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """All that one result file holds.
 
     case: the design problem.
     kind: the command that made it.
-    status: a word of `RunStatus`.
-    reason: a sentence on it.
-    datasets: what stands in the file, by its path.
     provenance: what made it: versions, command, machine.
     settings: what was chosen and why (integrator, sensitivity method, seed), attributes of the group `settings`.
+    datasets: arrays and texts, by their paths in the file.
+    status: a word of `RunStatus`.
+    reason: a sentence on it.
     warnings: sentences.
     """
+
+    case: Case
+    kind: str
+    provenance: Provenance
+    settings: Mapping[str, Attribute]
+    datasets: Datasets
+    status: str = "running"
+    reason: str = "running"
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def begun(
+        cls, case: Case, kind: str, command: str, datasets: Datasets, settings: Mapping[str, Attribute] | None = None
+    ) -> "Contents":
+        """What is the same each time a command writes its file.
+
+        command: the command line, for the record. settings: those of the command; what --set changed is added.
+        """
+        settings = {**(settings or {}), **set_keys(case)}
+        return cls(case=case, kind=kind, provenance=Provenance.collect(command), settings=settings, datasets=datasets)
+
+    def now(self, status: str, reason: str, datasets: Datasets, warnings: tuple[str, ...] = ()) -> "Contents":
+        """The same file with what is known by now. datasets: those that are added, or replaced."""
+        return replace(self, status=status, reason=reason, datasets=self.datasets | datasets, warnings=warnings)
+
+
+def result_image(contents: Contents) -> bytes:
+    """A whole result file, as bytes."""
+    case, provenance, status = contents.case, contents.provenance, contents.status
     root: dict[str, Attribute] = {
         "format": FORMAT,
         "mdstopo": provenance.mdstopo,
         "case_sha256": case.sha256,
         "status": status,
-        "kind": kind,
-        "reason": reason,
+        "kind": contents.kind,
+        "reason": contents.reason,
         "name": case.name,
         "title": case.title or "",
         "case_path": "" if case.path is None else str(case.path),
@@ -142,9 +165,9 @@ def result_image(
     attributes: dict[str, Mapping[str, Attribute]] = {
         "": root,
         "provenance": provenance.attributes(),
-        "settings": settings,
+        "settings": contents.settings,
     }
-    whole = {**datasets, "warnings": list(warnings)}
+    whole = {**contents.datasets, "warnings": list(contents.warnings)}
     if status == "running":  # checkpoints are many, and nobody opens them in a notebook
         return encode(attributes, whole)
     marked = labels(case, whole)

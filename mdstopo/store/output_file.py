@@ -7,11 +7,9 @@ from pathlib import Path
 from mdstopo.case.model import Case
 from mdstopo.store.admit import admit, prepare_place
 from mdstopo.store.atomic import remove_leftovers
-from mdstopo.store.contents import Datasets, case_part
+from mdstopo.store.contents import Contents, Datasets, case_part
 from mdstopo.store.image import Attribute
 from mdstopo.store.lock import Lock
-from mdstopo.store.provenance import Provenance
-from mdstopo.store.set_keys import set_keys
 from mdstopo.store.writing import write_result
 
 
@@ -33,17 +31,8 @@ class OutputFile:
         warnings: tuple[str, ...] = (),
     ) -> None:
         """Write the result, with the case and what --set changed of it. Raises WriteError if the disk refuses."""
-        write_result(
-            self._path,
-            self._case,
-            self._kind,
-            status,
-            reason,
-            case_part(self._case) | datasets,
-            Provenance.collect(self._command),
-            {**settings, **set_keys(self._case)},
-            warnings,
-        )
+        contents = Contents.begun(self._case, self._kind, self._command, case_part(self._case), settings)
+        write_result(self._path, contents.now(status, reason, datasets, warnings))
 
 
 @contextmanager

@@ -1,17 +1,14 @@
 """A result as a whole into its file; what a process writes first is read back before it replaces anything."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
 import numpy as np
 from h5py import h5d, h5s
 
-from mdstopo.case.model import Case
 from mdstopo.store.atomic import replace_file
-from mdstopo.store.contents import Datasets, result_image
-from mdstopo.store.image import Attribute, as_array
-from mdstopo.store.provenance import Provenance
+from mdstopo.store.contents import Contents, Datasets, result_image
+from mdstopo.store.image import as_array
 from mdstopo.store.seal import read_seal
 from mdstopo.store.store_errors import UnreadableError
 
@@ -19,35 +16,14 @@ from mdstopo.store.store_errors import UnreadableError
 _written: set[Path] = set()
 
 
-def write_result(
-    path: Path,
-    case: Case,
-    kind: str,
-    status: str,
-    reason: str,
-    datasets: Datasets,
-    provenance: Provenance,
-    settings: Mapping[str, Attribute],
-    warnings: tuple[str, ...] = (),
-) -> None:
+def write_result(path: Path, contents: Contents) -> None:
     """Replace a result file.
-
-    path: the file.
-    case: the design problem.
-    kind: the command that made it.
-    status: a word of `RunStatus`.
-    reason: a sentence on it.
-    datasets: what stands in the file, by its path.
-    provenance: what made it: versions, command, machine.
-    settings: what was chosen and why, attributes of the group `settings`.
-    warnings: sentences.
 
     Raises WriteError where the file system refuses, UnreadableError where what was written cannot be read again; the
     file is then as it was.
     """
-    image = result_image(case, kind, status, reason, datasets, provenance, settings, warnings)
     first = path not in _written
-    replace_file(path, image, (lambda made: read_back(made, datasets)) if first else None)
+    replace_file(path, result_image(contents), (lambda made: read_back(made, contents.datasets)) if first else None)
     _written.add(path)
 
 

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from mdstopo.case.text.nodes import DEEPEST
+from mdstopo.case.text.nodes import DEEPEST_NESTING
 from mdstopo.case.text.scalars import resolve
 
 from .scenes import SMALL, changed, mistakes, small
@@ -91,8 +91,8 @@ def test_a_mistake_in_an_alias_is_told_where_the_alias_stands() -> None:
         ("a: *b\n", (1, 4), "&b"),
         ("a: &a [*a]\n", (1, 8), "inside"),
         ("%YAML 3.0\n---\na: 1\n", (1, 1), "incompatible"),
-        ("a: " + "[" * 900, (1, 3 + DEEPEST), "deeper"),
-        ("- " * 900, (1, 2 * DEEPEST + 1), "deeper"),
+        ("a: " + "[" * 900, (1, 3 + DEEPEST_NESTING), "deeper"),
+        ("- " * 900, (1, 2 * DEEPEST_NESTING + 1), "deeper"),
     ],
 )
 def test_what_is_no_case_file_is_refused_at_its_place(text: str, place: tuple[int, int], word: str) -> None:
@@ -106,7 +106,7 @@ def test_what_is_nested_very_deeply_is_refused_by_its_depth(text: str) -> None:
     """Some versions of the parser refuse it themselves, further on in the line."""
     (mistake,) = mistakes(text)
     assert mistake.line == 1
-    assert mistake.message == f"nested deeper than {DEEPEST} levels"
+    assert mistake.message == f"nested deeper than {DEEPEST_NESTING} levels"
 
 
 def test_an_alias_bomb_is_refused_with_its_count_and_at_once() -> None:

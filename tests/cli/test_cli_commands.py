@@ -18,6 +18,7 @@ import pytest
 from mdstopo.cli.group import run_group
 from mdstopo.cli.interrupt import Interrupts
 from mdstopo.store import atomic, checkpoint
+from tests.commands import call
 
 CASE = """\
 format: 1
@@ -58,12 +59,6 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
     yield
     for number, handler in kept.items():
         signal.signal(number, handler)
-
-
-def call(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
-    status = run_group(list(words))
-    said = capsys.readouterr()
-    return status, said.out, said.err
 
 
 def answer(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from mdstopo.finalize.keep import chosen, places, restricted
 from mdstopo.finalize.scaled_laws import scaled_law
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.status import Status
+from tests.commands import call
 
 SPRINGS = """\
 format: 1
@@ -102,12 +103,6 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "in" / "pulse.csv").write_text("t;value\n0;0\n0.05;20\n0.1;5\n")
     (tmp_path / "in" / "probe.yaml").write_text(SPRINGS)
     (tmp_path / "in" / "legs.yaml").write_text(LAWS_OF_ALL_KINDS)
-
-
-def call(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
-    status = run_group(list(words))
-    said = capsys.readouterr()
-    return status, said.out, said.err
 
 
 #: laws with keys that are forces; of `expression` the formulas are sized (tests/case/test_expression_laws.py)

@@ -10,8 +10,7 @@ import pytest
 from mdstopo import cli
 from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
-from mdstopo.session.run_session import _Run
-from mdstopo.starts.callbacks import ignore, never
+from mdstopo.session.final_design import judged
 from mdstopo.status import RunStatus
 from tests.front.support import CASE
 from tests.session.test_combined_runs import single
@@ -45,10 +44,8 @@ def test_a_run_that_finds_no_feasible_design_fails_and_names_the_constraint(caps
 @pytest.mark.parametrize("status", [RunStatus.FAILED, RunStatus.CONVERGED, RunStatus.MAX_ITERATIONS])
 def test_the_violated_constraint_is_named_whatever_the_optimiser_ended_with(status):
     case = read_case(single().replace("equals: 7.2}", "equals: 7.2}" + LIMIT))
-    run = _Run(case, None, ignore, never, ignore, "")
-    run.states = [SimpleNamespace(best_violation=0.5)]
-    run.constraints = np.array([1e-12, 0.5e-6])
-    word, reason = run.judge(0, status, "why it ended")
+    constraints = np.array([1e-12, 0.5e-6])
+    word, reason = judged(case, SimpleNamespace(best_violation=0.5), constraints, status, "why it ended")
     assert word is (RunStatus.FAILED if status is RunStatus.CONVERGED else status)
     assert (
         "no design was found that keeps the constraints: constraints[1] (max displacement of torso relative to vehicle"
@@ -56,8 +53,8 @@ def test_the_violated_constraint_is_named_whatever_the_optimiser_ended_with(stat
     )
     assert ") is 5e-07 m above its limit 1e-06 m (why it ended)" in reason
     assert reason.endswith("(why it ended)")
-    run.states = [SimpleNamespace(best_violation=0.0)]
-    assert run.judge(0, status, "why it ended") == (status, "why it ended")
+    kept = judged(case, SimpleNamespace(best_violation=0.0), constraints, status, "why it ended")
+    assert kept == (status, "why it ended")
 
 
 def test_constraints_and_objectives_of_the_output_are_of_one_design(capsys):

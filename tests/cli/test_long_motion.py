@@ -40,7 +40,7 @@ def test_how_far_is_told_by_the_steps_of_late() -> None:
 
 
 def test_nothing_is_told_of_a_motion_that_is_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(long_motion, "SHORT", 0.001)
+    monkeypatch.setattr(long_motion, "RATE_OVER", 0.001)
     asked = list[str]()
 
     def all_steps(driver: Any) -> Any:
@@ -68,7 +68,7 @@ def test_what_makes_steps_short_is_named() -> None:
 
 
 def test_a_long_motion_is_told_while_it_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(long_motion, "SHORT", 0.001)
+    monkeypatch.setattr(long_motion, "RATE_OVER", 0.001)
     monkeypatch.setattr(long_motion, "fastest", lambda case, alpha, name: "speck is fast")
     case, said = read_case(CASE), list[str]()
     driver: Any = SimpleNamespace(room=np.zeros(100_001), limits=[10, 100_000])

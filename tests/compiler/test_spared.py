@@ -202,7 +202,7 @@ def test_long_loops_are_optimised_once(split: str, monkeypatch) -> None:
     assert compiles is not None
     from mdstopo.compiler.numba_private import numba_functions
 
-    monkeypatch.setattr(units, "LONG", 1)
+    monkeypatch.setattr(units, "LONG_FUNCTION", 1)
     monkeypatch.setattr(units, "_OURS", "_ZN")
     monkeypatch.setattr(units, "SPLIT", split or units.SPLIT)
     monkeypatch.setattr(units, "STAYING", (__name__,))

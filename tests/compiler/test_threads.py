@@ -8,7 +8,7 @@ import pytest
 
 from mdstopo.cli.group import run_group
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.compiler.threads import MOST, VARIABLE, ThreadsError, allowed, cores, shared, taken
+from mdstopo.compiler.threads import MOST_THREADS, VARIABLE, ThreadsError, allowed, cores, shared, taken
 
 
 @kernel
@@ -34,7 +34,7 @@ def _system_threads():
     return len(list(Path("/proc/self/task").iterdir()))
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, MOST, MOST + 5])
+@pytest.mark.parametrize("count", [1, 2, 3, MOST_THREADS, MOST_THREADS + 5])
 def test_every_piece_is_done_once_and_all_threads_have_ended(count):
     fill(np.zeros(1), 1, -1)  # compiled
     before = _system_threads() if Path("/proc/self/task").exists() else threading.active_count()
@@ -42,7 +42,7 @@ def test_every_piece_is_done_once_and_all_threads_have_ended(count):
     asked = fill(out, count, -1)
     assert np.all(out == 200.0)
     # each thread finds out once that nothing is left
-    assert asked == len(out) + min(count, MOST)
+    assert asked == len(out) + min(count, MOST_THREADS)
     after = _system_threads() if Path("/proc/self/task").exists() else threading.active_count()
     assert after == before
 
@@ -63,10 +63,10 @@ def test_a_piece_is_taken_once_in_python_too():
 
 def test_the_environment_says_how_many(monkeypatch):
     monkeypatch.delenv(VARIABLE, raising=False)
-    assert allowed() == min(cores(), MOST)
+    assert allowed() == min(cores(), MOST_THREADS)
     monkeypatch.setenv(VARIABLE, "3")
     assert allowed() == 3
-    for wrong in ("0", "-1", "two", "1.5", str(MOST + 1)):
+    for wrong in ("0", "-1", "two", "1.5", str(MOST_THREADS + 1)):
         monkeypatch.setenv(VARIABLE, wrong)
         with pytest.raises(ThreadsError, match="not a number of threads from 1 to"):
             allowed()

@@ -14,7 +14,7 @@ import numpy as np
 from mdstopo.compiler import compiled_units as units, store
 from mdstopo.compiler.jit import entry, kernel
 
-units.SPLIT, units.LONG, units._OURS = __name__, 1, "_ZN8__main__"
+units.SPLIT, units.LONG_FUNCTION, units._OURS = __name__, 1, "_ZN8__main__"
 
 @kernel
 def taken(n):

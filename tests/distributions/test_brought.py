@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from mdstopo.case.objects.aims import Response
+from mdstopo.case.objects.problem_parts import Response
 from mdstopo.case.keys.kinds import POSITIVE, Ref
 from mdstopo.case.laws.law import Law, free_length_key
 from mdstopo.case.keys.records import Key, Record

@@ -1,6 +1,5 @@
 """Scenes as case text: random ones with chosen features, and the paper's. JSON is YAML, so a dictionary is enough."""
 
-import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -9,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case
-from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.reader import load_case
+from tests.reading import case_from
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -22,7 +22,7 @@ FEATURES = frozenset({
 
 def read(scene: dict[str, Any], **solver: Any) -> Case:
     """The case of a scene, with solver settings."""
-    return read_case(json.dumps({"format": 1, **scene, "solver": solver}))
+    return case_from(scene, solver=solver)
 
 
 def with_solver(case: Case, **solver: Any) -> Case:

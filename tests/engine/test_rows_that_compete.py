@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mdstopo.design_problem import GROWTH, MOST_ROWS, NEAR, DesignProblem
+from mdstopo.design_problem import GROWTH, MOST_ROWS, PEAKS_OF_RESPONSE, DesignProblem
 from mdstopo.evaluation import Rows
 from mdstopo.status import Status
 
-FEW = NEAR[1]
+FEW = PEAKS_OF_RESPONSE[1]
 
 
 class Peaks:
@@ -27,7 +27,7 @@ class Peaks:
 
 def problem():
     made = DesignProblem.__new__(DesignProblem)
-    made.rows, made._enough, made.initial = Rows(*NEAR), None, np.zeros(3)
+    made.rows, made._enough, made.initial = Rows(*PEAKS_OF_RESPONSE), None, np.zeros(3)
     made._evaluator = Peaks()
     return made
 

@@ -59,7 +59,7 @@ def _found(case, design, threads, monkeypatch):
 @pytest.mark.parametrize(("integrator", "absent"), [("gauss", 0.0), ("gauss", 0.6), ("runge_kutta", 0.6)])
 def test_results_are_the_same_to_the_bit_for_any_number_of_threads(integrator, absent, monkeypatch):
     # one pose alone is worth threads, too: what is single steps for `runge_kutta`
-    count = {"gauss": 50_000, "runge_kutta": passes.WORTH}[integrator]
+    count = {"gauss": 50_000, "runge_kutta": passes.WORTH_THREADS}[integrator]
     case = read(scene(count), integrator=integrator, tolerance=1e-4)
     assert case.n_design > MANY
     rng = np.random.default_rng(3)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mdstopo.formula.formula_error import FormulaError
 from mdstopo.formula.formula_values import finite_value, value_of
-from mdstopo.formula.parser import DEEPEST, LONGEST, MOST, parse
+from mdstopo.formula.parser import DEEPEST_NESTING, MOST_CHARACTERS, MOST_PARTS, parse
 from mdstopo.formula.tree import FUNCTIONS, name, number, operation, parts, text_of
 from tests.tiers import examples
 
@@ -164,12 +164,12 @@ def test_a_value_that_is_not_finite_is_told_by_what_makes_it(text: str, column: 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("1" * (LONGEST + 1), f"allowed are {LONGEST:,}"),
-        ("(" * 100 + "1" + ")" * 100, f"deeper than {DEEPEST}"),
-        ("-" * 100 + "1", f"deeper than {DEEPEST}"),
-        ("2^" * 100 + "2", f"deeper than {DEEPEST}"),
-        ("sin(" * 100 + "1" + ")" * 100, f"deeper than {DEEPEST}"),
-        ("1+" * 2000 + "1", f"more than {MOST:,}"),
+        ("1" * (MOST_CHARACTERS + 1), f"allowed are {MOST_CHARACTERS:,}"),
+        ("(" * 100 + "1" + ")" * 100, f"deeper than {DEEPEST_NESTING}"),
+        ("-" * 100 + "1", f"deeper than {DEEPEST_NESTING}"),
+        ("2^" * 100 + "2", f"deeper than {DEEPEST_NESTING}"),
+        ("sin(" * 100 + "1" + ")" * 100, f"deeper than {DEEPEST_NESTING}"),
+        ("1+" * 2000 + "1", f"more than {MOST_PARTS:,}"),
     ],
 )
 def test_what_would_take_long_or_much_memory_is_refused(text: str, words: str) -> None:
@@ -178,8 +178,8 @@ def test_what_would_take_long_or_much_memory_is_refused(text: str, words: str) -
 
 
 def test_the_largest_formula_is_computed() -> None:
-    text = "+".join(["x"] * (MOST // 2))
-    assert value_of(parse(text).root, {"x": 2.0}) == 2.0 * (MOST // 2)
+    text = "+".join(["x"] * (MOST_PARTS // 2))
+    assert value_of(parse(text).root, {"x": 2.0}) == 2.0 * (MOST_PARTS // 2)
 
 
 @given(st.text(max_size=60) | st.text(alphabet="xk019.e+-*/^()<>=, if\t" + "".join(FUNCTIONS), max_size=40))

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,7 @@ from mdstopo.plan import solve_task as tasks
 from mdstopo.session.run_session import run_session
 from mdstopo.store.result_reader import read_result
 from tests.front.support import CASE
-
-WALL_TIMES = {"seconds", "created"}
+from tests.result_files import assert_same_files, stop_after
 
 
 @pytest.fixture(autouse=True)
@@ -49,25 +48,10 @@ def spread(count: int) -> np.ndarray:
     return np.stack([share, 1.0 - share], axis=1)
 
 
-def after(count: int) -> Callable[[], bool]:
-    """Stops when it has been asked so often: once before a solve, and once in each of its iterations."""
-    asked = iter(range(1_000_000))
-    return lambda: next(asked) > count
-
-
-def assert_same(one: str, other: str) -> None:
-    first, second = read_result(one), read_result(other)
-    assert first.texts == second.texts
-    assert first.arrays.keys() == second.arrays.keys()
-    for name, array in first.arrays.items():
-        if name.rpartition("/")[2] not in WALL_TIMES:
-            assert np.asarray(array).tobytes() == np.asarray(second.arrays[name]).tobytes(), name
-
-
 def test_a_front_that_is_stopped_within_a_solve_goes_on_within_it(starts: list[int]) -> None:
     case, ask = read_case(CASE), Ask(spread(3))
     run_front(case, ask, path=Path("whole.h5"), workers=1)
-    first = run_front(case, ask, path=Path("parts.h5"), workers=1, stop_requested=after(9))
+    first = run_front(case, ask, path=Path("parts.h5"), workers=1, stop_requested=stop_after(9))
     assert first.status == "interrupted"
     with h5py.File("parts.h5") as file:
         assert list(file["pareto/tasks/begun"]) == ["0"]
@@ -75,18 +59,18 @@ def test_a_front_that_is_stopped_within_a_solve_goes_on_within_it(starts: list[i
     run_front(case, ask, path=Path("parts.h5"), resume=True, workers=1)
     assert starts[0] > 2
     assert set(starts[1:]) == {1}
-    assert_same("whole.h5", "parts.h5")
+    assert_same_files("whole.h5", "parts.h5")
 
 
 def test_individual_optima_of_a_run_go_on_within_a_solve(starts: list[int]) -> None:
     case = read_case(CASE)
     run_session(case, path="whole.h5")
     with pytest.raises(KeyboardInterrupt):
-        run_session(case, path="parts.h5", stop_requested=after(9))
+        run_session(case, path="parts.h5", stop_requested=stop_after(9))
     starts.clear()
     run_session(case, path="parts.h5", resume=True)
     assert starts[0] > 2
-    assert_same("whole.h5", "parts.h5")
+    assert_same_files("whole.h5", "parts.h5")
 
 
 def test_a_front_that_is_killed_in_its_first_solve_has_saved_what_it_had() -> None:
@@ -109,7 +93,7 @@ def reached() -> State:
     """A state of an optimiser."""
     found: list[State] = []
     case = read_case(CASE)
-    run_front(case, Ask(spread(2)), path=Path("x.h5"), workers=1, stop_requested=after(4))
+    run_front(case, Ask(spread(2)), path=Path("x.h5"), workers=1, stop_requested=stop_after(4))
     from mdstopo.plan.stored_tasks import read_begun
 
     found += read_begun(read_result("x.h5")).values()

@@ -29,7 +29,7 @@ LOOSE = {"optimizer": {"tolerance": 1e-4}}
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Solves begin with some 40 of the 640 candidates."""
     monkeypatch.setattr(candidates, "START_SET", 40)
-    monkeypatch.setattr(pricing, "MOST", 20)
+    monkeypatch.setattr(pricing, "MOST_ENTERING", 20)
 
 
 def asked(count: int = 3) -> Ask:

@@ -21,10 +21,10 @@ from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
 from mdstopo.store.result_reader import read_result
 from tests.front.support import CASE
-from tests.front.test_begun import after, assert_same
 from tests.front.test_fronts import spread
 from tests.optimizer.toys import compliance_problem
 from tests.plan.test_plan import carried_out, convex, solver
+from tests.result_files import assert_same_files, stop_after
 
 STARTS = 4
 U = Scalarisation("weighted_sum", np.ones(2))
@@ -187,23 +187,23 @@ def test_starts_are_dropped_at_quotas_and_the_best_go_on(whole: Path) -> None:
 @pytest.mark.parametrize("asked", [3, 15, 28, 41, 54, 67, 80, 92])
 def test_a_front_with_several_starts_ends_the_same_wherever_it_was_stopped(asked: int, whole: Path) -> None:
     case, ask, path = read_case(CASE), Ask(spread(3), starts=STARTS), Path("parts.h5")
-    assert run_front(case, ask, path=path, workers=1, stop_requested=after(asked)).status == "interrupted"
-    run_front(case, ask, path=path, workers=1, stop_requested=after(asked // 2), resume=True)
+    assert run_front(case, ask, path=path, workers=1, stop_requested=stop_after(asked)).status == "interrupted"
+    run_front(case, ask, path=path, workers=1, stop_requested=stop_after(asked // 2), resume=True)
     run_front(case, ask, path=path, workers=1, resume=True)
-    assert_same(str(whole), "parts.h5")
+    assert_same_files(whole, "parts.h5")
 
 
 def test_workers_change_nothing_with_several_starts(whole: Path) -> None:
     run_front(read_case(CASE), Ask(spread(3), starts=STARTS), path=Path("two.h5"), workers=2, worth=0.0)
-    assert_same(str(whole), "two.h5")
+    assert_same_files(whole, "two.h5")
 
 
 @pytest.mark.parametrize("asked", [40, 10_000])
 def test_a_front_resumed_with_another_number_of_starts_ends_as_one_that_had_them(asked: int, whole: Path) -> None:
     case = read_case(CASE)
-    run_front(case, Ask(spread(3), starts=2), path=Path("more.h5"), workers=1, stop_requested=after(asked))
+    run_front(case, Ask(spread(3), starts=2), path=Path("more.h5"), workers=1, stop_requested=stop_after(asked))
     run_front(case, Ask(spread(3), starts=STARTS), path=Path("more.h5"), workers=1, resume=True)
-    assert_same(str(whole), "more.h5")
+    assert_same_files(whole, "more.h5")
 
 
 def test_more_starts_find_ends_that_are_no_worse() -> None:

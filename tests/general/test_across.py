@@ -7,6 +7,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
 from mdstopo.general.responses.extremes import FRACTION, RATE, TIME
+from tests.reading import case_of
 
 CONES = Rows(cones=True)
 
@@ -121,10 +122,6 @@ def vector_of(case, trajectory, response, t):
 def differences(function, h):
     """d function(x)/dx at 0, by sixth-order central differences."""
     return sum(w * (function(m * h) - function(-m * h)) for m, w in ((1, 0.75), (2, -0.15), (3, 1 / 60))) / h
-
-
-def case_of(text, **solver):
-    return read_case(text, overrides={f"solver.{key}": str(value) for key, value in solver.items()})
 
 
 def check(case, design, h, moving=()):

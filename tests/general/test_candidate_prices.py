@@ -1,18 +1,16 @@
 """Prices of candidates that are not built, in scenes with joints, contacts, loads, any laws and responses, in space."""
 
-import json
-
 import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.reader import read_case
 from mdstopo.case.scene import candidates
 from mdstopo.case.scene.candidates import with_members
 from mdstopo.engine import Evaluator
 from mdstopo.general.model.priced_candidates import FIRST_STAGE, KIND, LAST_STAGE, MOVES, NODE, NODES, POINT
 from mdstopo.sensitivity.springs_candidate_prices import COMPUTED, ERROR
 from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
+from tests.reading import case_from
 from tests.sensitivity.test_candidate_prices import assert_dense_pass_is_right
 from tests.tiers import examples
 
@@ -202,7 +200,7 @@ class Priced:
 
     def __init__(self, scene, step=STEP, **solver):
         solver |= {"step": step, **({} if "free" in scene.get("title", "") else {"integrator": "runge_kutta"})}
-        self.case = case = read_case(json.dumps({"format": 1, **scene, "solver": solver}))
+        self.case = case = case_from(scene, solver=solver)
         group = case.members[0]
         self.i, self.j = np.divmod(np.arange(group.candidates.count), len(group.to_local))
         whole = with_members(case, {"web": (self.i, self.j)})
@@ -336,7 +334,7 @@ def test_prices_of_legs_whose_ends_pass_through_each_other_come_to_a_closed_form
     def off(step):
         """How far prices and the gradient of some of the members are from it, relative to the largest."""
         solver = {"step": step, "integrator": "runge_kutta"}
-        case = read_case(json.dumps({"format": 1, **scene, "solver": solver}))
+        case = case_from(scene, solver=solver)
         evaluator = Evaluator(case)
         problem = evaluator.problem()
         evaluation = problem.evaluation(np.zeros(case.n_design))
@@ -376,7 +374,7 @@ def test_time_goes_on_where_a_member_switches_right_behind_another():
     """The response was not a number in the step without length that ended at the second switch."""
     law = {"type": "crush", "stiffness": 900, "force": 40, "side": "tension", "free_length": 0.3, "active_from": 0.1}
     solver = {"step": STEP, "integrator": "runge_kutta"}
-    case = read_case(json.dumps({"format": 1, **arm(law, **looked(PUSH, "max")), "solver": solver}))
+    case = case_from(arm(law, **looked(PUSH, "max")), solver=solver)
     whole = with_members(case, {"web": np.divmod(np.arange(80), 21)})
     alpha = np.full(whole.n_design, 0.4)
     motion = mdstopo.simulate(whole, alpha)
@@ -403,7 +401,7 @@ def test_the_price_of_mirror_images_is_the_sum_of_theirs():
     scene["design"]["mirrored"] = [["web", "image"]]
     scene["constraints"] = [{"volume": "all", "limit": 30}]
     solver = {"step": STEP, "integrator": "runge_kutta"}
-    case = read_case(json.dumps({"format": 1, **scene, "solver": solver}))
+    case = case_from(scene, solver=solver)
     web, image = case.members[0], case.members[-1]
     assert np.array_equal(web.from_index, image.from_index)
     width = len(web.to_local)
@@ -422,7 +420,7 @@ def test_the_price_of_mirror_images_is_the_sum_of_theirs():
     gradient = Evaluator(whole).problem().evaluate(alpha).gradients.sum(axis=0)[: len(i)]
     found = evaluator.candidates_of(web).prices(states, i, j)
     assert np.abs(found - gradient).max() <= AGREE * np.abs(gradient).max()
-    alone = read_case(json.dumps({"format": 1, **scene, "solver": solver, "design": {"lower": 0, "initial": 0.4}}))
+    alone = case_from(scene, solver=solver, design={"lower": 0, "initial": 0.4})
     apart = Evaluator(alone).candidates_of(alone.members[0]).prices(states, i, j)
     assert np.abs(apart - gradient).max() > 0.01 * np.abs(gradient).max()
 
@@ -556,7 +554,7 @@ def test_a_dense_pass_by_laws_with_modes_knows_mirror_images():
 
 def images_of(scene, alpha):
     """What `states_of` tells of a scene with mirrored groups."""
-    case = read_case(json.dumps({"format": 1, **scene, "solver": {"step": STEP, "integrator": "runge_kutta"}}))
+    case = case_from(scene, solver={"step": STEP, "integrator": "runge_kutta"})
     evaluator = Evaluator(case)
     problem = evaluator.problem()
     evaluation = problem.evaluation(np.full(case.space.size, alpha))
@@ -681,7 +679,7 @@ def test_formulas_that_may_be_sharp_anywhere_are_priced_one_by_one():
 def states_of(scene, alpha, **solver):
     """The candidates of a scene's first group, and what the rows ask of them where all members have that alpha."""
     solver = solver or {"step": STEP, "integrator": "runge_kutta"}
-    case = read_case(json.dumps({"format": 1, **scene, "solver": solver}))
+    case = case_from(scene, solver=solver)
     evaluator = Evaluator(case)
     problem = evaluator.problem()
     evaluation = problem.evaluation(np.broadcast_to(alpha, case.n_design).astype(float))
@@ -728,7 +726,7 @@ def test_few_candidates_that_act_amid_many_that_do_not_are_found(law):
         **looked({"displacement": {"body": "lift", "component": "y"}}, "max_abs"),
         "constraints": [{"volume": "all", "limit": 20}],
     }  # fmt: skip
-    group = read_case(json.dumps({"format": 1, **scene})).members[0]
+    group = case_from(scene).members[0]
     candidates, states = states_of(
         scene, np.append(np.zeros(len(group)), 1.0), integrator="runge_kutta", tolerance=1e-8
     )

@@ -9,7 +9,7 @@ from mdstopo.general.dynamics.accelerations import make_workspace, solve_acceler
 from mdstopo.general.integrators.runge_kutta import FIRST_ERRORS
 from mdstopo.general.model.general_model import pack_general, unpack_general
 from mdstopo.general.scene.compile_general import compile_general
-from mdstopo.general.steps.first_step import PROBES, first_step
+from mdstopo.general.steps.first_step import MOST_BALANCES, first_step
 from mdstopo.integrators.steps import FORCES, TURN, WORK
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from tests.compiled import compiled
@@ -76,7 +76,7 @@ def test_it_follows_from_the_period_of_a_swing(tolerance, start, law, order, met
     omega = np.sqrt(800 / 2)
     expected = np.sqrt(2) / omega * (tolerance / FIRST_ERRORS[method]) ** (1 / order)
     assert step == pytest.approx(expected, rel=0.2)
-    assert balances <= PROBES
+    assert balances <= MOST_BALANCES
 
 
 def test_bodies_turn_by_no_more_than_a_step_may():
@@ -93,7 +93,7 @@ def test_what_looks_the_same_at_every_scale_begins_with_the_whole_time():
     text = SWING.format(law=DAMPED, speed=0, force="{table: [[0, 0], [5, 50]]}")
     step, balances = first(text, 1e-8, 8, noise=1e-30)
     assert step == 5.0
-    assert balances == PROBES
+    assert balances == MOST_BALANCES
 
 
 @pytest.mark.parametrize("law", [DAMPED, CUBIC])

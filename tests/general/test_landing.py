@@ -43,7 +43,7 @@ def located(margin, rounding, resolution):
     last, before = (low, at_low), (high, at_high)
     for tries in range(locate.TRIALS):
         slope = (last[1] - before[1]) / (last[0] - before[0])
-        foreseen = last[0] - (last[1] + locate.AIM * rounding) / slope if slope < 0.0 and tries > 0 else -1.0
+        foreseen = last[0] - (last[1] + locate.BEHIND_SWITCH * rounding) / slope if slope < 0.0 and tries > 0 else -1.0
         middle = locate.next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries)
         if middle < 0.0:
             return high, tries
@@ -66,7 +66,7 @@ def test_the_first_of_two_margins_of_other_units_is_met_to_rounding(apart, steep
 
     found, tries = located(margin, rounding, resolution)
     assert margin(found) < -rounding
-    assert 0.0 < found - first <= locate.NEAR * rounding / steep + resolution
+    assert 0.0 < found - first <= locate.NEAR_SWITCH * rounding / steep + resolution
     assert tries < locate.TRIALS
 
 

@@ -26,7 +26,7 @@ combine: {weights: {LOWEST: 1, MEAN: 1}}
 solver: {integrator: INTEGRATOR}
 """
 
-#: three springs on a free body, whose largest force is lowest where two of them change hands
+#: three springs on a free body, whose largest force is lowest where it passes from one to another
 FREE = """
 format: 1
 time: {end: 2}

@@ -82,7 +82,7 @@ def test_a_reduction_has_its_value_and_its_derivative(evaluation, name):
 
 
 def test_values_alone_leave_the_gradients_as_they_are(engine, evaluation):
-    """Those of integrals had been multiplied each time, which overflows in the end."""
+    """Gradients of integrals were multiplied at each such call, until they overflowed."""
     kept = engine.driver("default").gradients
     before = kept.copy()
     assert engine.evaluate(np.array([ALPHA]), gradient=False).objectives == evaluation.objectives

@@ -10,8 +10,9 @@ from mdstopo.evaluation import Rows
 from mdstopo.general.driver import row_gradients
 from mdstopo.general.over_time import competing_members
 from tests.general.support import design_of, load
-from tests.general.test_across import SCENE, STRUCK, VARIABLES, case_of
+from tests.general.test_across import SCENE, STRUCK, VARIABLES
 from tests.general.test_competing_members import GRID
+from tests.reading import case_of
 
 ALL = Rows(window=1.0, most=8, cones=True)
 IMPLICIT = {"integrator": "generalized_alpha", "step": 0.004}

@@ -59,7 +59,7 @@ def test_integrals_that_were_right_keep_their_bits(integrator, monkeypatch):
     cases = [read(random_scene(seed, "ground", "off_centre", over_time="mean")) for seed in seeds]
     cases = [with_solver(case, integrator=integrator) for case in cases]
     plain = [evaluate(case, random_design(case, seed)) for seed, case in zip(seeds, cases, strict=True)]
-    monkeypatch.setattr(integrands, "SHARE", 1e-9)  # every step is suspected
+    monkeypatch.setattr(integrands, "LEFT_BY_STEP", 1e-9)  # every step is suspected
     for seed, case, before in zip(seeds, cases, plain, strict=True):
         again = evaluate(with_solver(case), random_design(case, seed))  # compiled anew
         assert again.objectives == before.objectives

@@ -415,7 +415,7 @@ def test_slopes_by_parameters_are_differences_of_laws_with_other_parameters(kind
             h = 1e-6 * (1.0 + abs(own))
             below, here, above = (changed(own + side * h).margin(x, xd, mode) for side in (-4.0, 0.0, 4.0))
             if abs(above - 2.0 * here + below) > 1e-3 * h:
-                continue  # the smaller of two margins changes hands here
+                continue  # another margin becomes the smaller one here
             by_p = difference(lambda p, mode=mode: changed(p).margin(x, xd, mode), own, h)
             assert kernel.margin_by_parameter(place, x, xd, mode) == pytest.approx(by_p, rel=1e-5, abs=1e-5)
 
@@ -620,7 +620,7 @@ def test_a_margin_is_the_lesser_of_at_most_two_linear_functions_and_knows_no_tim
 @many
 @given(seeds)
 def test_the_margin_of_a_mode_is_the_least_of_margins_without_kinks(kind, seed):
-    # what leaves its mode and comes back within a step is found on cubics through values and rates at its ends
+    # a member that leaves its mode and returns within one step is found on cubics through values and rates at its ends
     rng = np.random.default_rng(seed)
     kernel, modes = with_modes(kind, rng)
     for mode in modes:

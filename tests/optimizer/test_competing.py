@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdstopo.optimizer.bundle import MOST, Bundle
+from mdstopo.optimizer.bundle import MOST_ROWS, Bundle
 from mdstopo.optimizer.bundle_method import PATIENCE
 from mdstopo.optimizer.competing_rows import Trial
 from mdstopo.optimizer.gsao import Gsao
@@ -252,7 +252,7 @@ def test_a_violation_that_steps_along_a_limit_leave_is_not_restored_first():
 
 
 def test_of_too_many_rows_those_go_that_have_not_been_used(monkeypatch):
-    monkeypatch.setattr("mdstopo.optimizer.bundle.ROOM", 8e4)
+    monkeypatch.setattr("mdstopo.optimizer.bundle.ROOM_FOR_ROWS", 8e4)
     n = 10**4
     slope = np.zeros((1, n))
     assert len(Bundle.empty(n)) == 0
@@ -271,16 +271,18 @@ def test_of_too_many_rows_those_go_that_have_not_been_used(monkeypatch):
 def test_beside_many_own_rows_there_is_room_for_what_trials_have_shown():
     """More own rows than there is room for: others stay that carried a multiplier last, and the newest of them."""
     rng = np.random.default_rng(2)
-    many = MOST + 20
+    many = MOST_ROWS + 20
     own = Bundle.of(Sample(1.0, rng.uniform(-1.0, 1.0, many), rng.normal(size=(many, 3))), np.arange(many))
-    lows = np.linspace(0.9, -3.0, MOST)
-    seen = Bundle.of(Sample(0.9, lows, np.tile([0.0, 0.0, 2.0], (MOST, 1))), np.arange(MOST)).moved(np.zeros(3), 0.1)
+    lows = np.linspace(0.9, -3.0, MOST_ROWS)
+    seen = Bundle.of(Sample(0.9, lows, np.tile([0.0, 0.0, 2.0], (MOST_ROWS, 1))), np.arange(MOST_ROWS)).moved(
+        np.zeros(3), 0.1
+    )
     seen.age[-5:] = 1
     kept = seen.joined(own).thinned()
     assert int(kept.own.sum()) == many
-    assert kept.subset(~kept.own).values() == pytest.approx(lows[-5 - MOST // 2 : -5])
+    assert kept.subset(~kept.own).values() == pytest.approx(lows[-5 - MOST_ROWS // 2 : -5])
     few = seen.joined(own.subset(np.arange(8))).thinned()
-    assert len(few) == MOST
+    assert len(few) == MOST_ROWS
     assert few.subset(~few.own).values() == pytest.approx(lows[3:-5])
 
 
@@ -292,7 +294,7 @@ def test_of_a_rejected_trial_those_rows_enter_that_are_nearest_to_what_stood_in_
     )
     trial = Bundle.of(sample, np.arange(2))
     assert trial.below() == pytest.approx([0.0, 2.0, 0.0, 0.4, 0.3])
-    n = MOST // 4 + 3
+    n = MOST_ROWS // 4 + 3
     many = Bundle.of(Sample(0.0, -np.arange(float(n)), np.ones((n, 2))), np.arange(n))
     before = Bundle.of(Sample(5.0, np.array([5.0, 4.0]), gradients), np.arange(2))
     before.own[0] = False

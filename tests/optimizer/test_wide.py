@@ -15,13 +15,13 @@ from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.safeguards import next_shift, no_cuts
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.wide_kernels import COARSER, FEWEST
-from mdstopo.optimizer.wide_slots import BEYOND, ROOM, ROW, SLOTS, WHOLE, bracket_slots, enter_slot, root
+from mdstopo.optimizer.wide_kernels import COARSER, FEWEST_SAMPLED
+from mdstopo.optimizer.wide_slots import BEYOND_MULTIPLIERS, ROOM, ROW, SLOTS, WHOLE, bracket_slots, enter_slot, root
 from mdstopo.settings.optimizer_presets import settings
 from tests.space.in_python import in_python  # noqa: F401  # a fixture
 
 N = 12_000
-SIZES = [wide.MANY, 1_020, N]
+SIZES = [wide.MANY_VARIABLES, 1_020, N]
 
 
 class Many:
@@ -46,9 +46,9 @@ class Many:
 
 def states(problem, steps, monkeypatch=None, **options):
     if monkeypatch is not None:
-        monkeypatch.setattr(wide, "MANY", 10**9)
+        monkeypatch.setattr(wide, "MANY_VARIABLES", 10**9)
         for module in (gsao, separable, wide, wide_numbers):
-            monkeypatch.setattr(module, "WIDE", 10**9)
+            monkeypatch.setattr(module, "VERY_MANY_VARIABLES", 10**9)
     optimizer = Gsao(problem, settings("default", options, max_iterations=100))
     found = [optimizer.start()]
     while found[-1].running and len(found) < steps:
@@ -115,7 +115,7 @@ def bisected(problem, state, chosen):
 
 
 @pytest.mark.parametrize("equal", [False, True])
-@pytest.mark.parametrize("n", [wide.MANY, 1_020, wide.PIECE + 5])
+@pytest.mark.parametrize("n", [wide.MANY_VARIABLES, 1_020, wide.PIECE + 5])
 def test_of_variables_that_rest_nothing_changes_what_the_others_do(n, equal):
     problem, chosen = resting(10, equal, n), settings()
     for state in states(problem, 3)[1:]:
@@ -131,7 +131,7 @@ def test_of_variables_that_rest_nothing_changes_what_the_others_do(n, equal):
 def test_one_multiplier_explains_where_each_of_very_many_goes(seed, options):
     """So many that a coarser sample is looked at first."""
     n = 70_001
-    assert n >= FEWEST * (COARSER * wide._stride(n) + 1)
+    assert n >= FEWEST_SAMPLED * (COARSER * wide._stride(n) + 1)
     problem, chosen = resting(seed, False, n), settings("default", options)
     cost, power = problem.linear.A[0], chosen.number("power")
     share = np.inf if power == 1.0 else 0.9
@@ -189,7 +189,7 @@ def rooted(numbers, x, goal, guess, power, room, whole):
         a, low, high, c, s, d, kappa = numbers[:, k]
         enter_slot(slots, place, k, k, c, s, a, low, high, d, kappa)
     ends = bracket_slots(slots, n, power, room, whole)
-    return root(slots, n, ends, x, goal, 0.0, guess, BEYOND, power, 1e-12, np.bool_(True), room, whole)[0]
+    return root(slots, n, ends, x, goal, 0.0, guess, BEYOND_MULTIPLIERS, power, 1e-12, np.bool_(True), room, whole)[0]
 
 
 @pytest.mark.usefixtures("in_python")

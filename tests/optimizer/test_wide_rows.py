@@ -16,7 +16,7 @@ from mdstopo.optimizer.state import State
 from mdstopo.optimizer.wide import Measures, Space
 from mdstopo.optimizer.wide_curvature import compact, known_curvature
 from mdstopo.optimizer.wide_interior import CURVED, EQUAL, LIMIT, LINE
-from mdstopo.optimizer.wide_program import FEW, Region, Room, WideProgram, solve
+from mdstopo.optimizer.wide_program import FEW_IN_DOUBT, Region, Room, WideProgram, solve
 from mdstopo.optimizer.wide_rows import Pool, WideModel
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
@@ -144,7 +144,7 @@ def test_where_all_variables_are_alike_all_are_in_doubt():
     found = solve(problem, Room.of(N))
     d = found.trial - problem.region.x
     assert found.solved
-    assert len(found.few.which) > FEW
+    assert len(found.few.which) > FEW_IN_DOUBT
     assert abs(value(problem, d) - bound(problem, found.theta)) < 1e-10 * N
 
 

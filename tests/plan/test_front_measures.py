@@ -69,7 +69,19 @@ def front_of(points):
     """A front with these objectives (W, 2)."""
     nothing = np.zeros(0)
     found = tuple(
-        Found(j, "k", nothing, row, 0.0, RunStatus.CONVERGED, "", 1, 0.0, 0.0, row[None])
+        Found(
+            point=j,
+            key="k",
+            alpha=nothing,
+            objectives=row,
+            combined=0.0,
+            status=RunStatus.CONVERGED,
+            reason="",
+            evaluations=1,
+            kkt=0.0,
+            violation=0.0,
+            visited=row[None],
+        )
         for j, row in enumerate(points)
     )
     return Front(found, (found[0], found[2]), points.min(axis=0), points.max(axis=0))

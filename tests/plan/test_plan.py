@@ -25,7 +25,19 @@ def solver(objectives, candidates, reach=np.inf, broken=()):
         g = np.full(len(objectives(best)), np.nan) if failed else objectives(best)
         status = RunStatus.FAILED if failed else RunStatus.CONVERGED
         word = "it is broken" if failed else "found"
-        return Found(task.point, "", best, g, min(values, default=0.0), status, word, 1, 0.0, 0.0, g[None])
+        return Found(
+            point=task.point,
+            key="",
+            alpha=best,
+            objectives=g,
+            combined=min(values, default=0.0),
+            status=status,
+            reason=word,
+            evaluations=1,
+            kkt=0.0,
+            violation=0.0,
+            visited=g[None],
+        )
 
     return solve
 

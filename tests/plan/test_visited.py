@@ -15,7 +15,7 @@ from mdstopo.front.directions import weights_of_first
 from mdstopo.front.run_front import Ask, run_front
 from mdstopo.plan import visited
 from mdstopo.plan.front_measures import dominated, scaled
-from mdstopo.plan.visited import DEEP, GAP, SLIVER, even_spacing
+from mdstopo.plan.visited import FAR_BELOW_LINE, GAP, SLIVER, even_spacing
 from mdstopo.status import RunStatus
 from mdstopo.store.result_reader import read_result
 from tests.front.support import CASE
@@ -213,7 +213,7 @@ def test_no_visited_design_beats_the_front_or_lies_alone_in_a_gap_of_it(method: 
             # how far along both axes at once the design would have to move to meet the line, and where it would
             share = (below[0] - below[1] - x + y) / (dx - dy)
             deep = ((y - below[1]) * dx - (x - below[0]) * dy) / (dx - dy)
-            assert not 0.0 < share < 1.0 or deep <= DEEP * even_spacing(5, 2) * (1.0 + 1e-9)
+            assert not 0.0 < share < 1.0 or deep <= FAR_BELOW_LINE * even_spacing(5, 2) * (1.0 + 1e-9)
         way = scaled(front, ideal, nadir) - scaled(values[None], ideal, nadir)
         apart = np.linalg.norm(way, axis=1)
         sliver = way.max(axis=1) < SLIVER * apart

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.case.reader import read_case
-from mdstopo.plots.cloud import FAR, planar_cloud, without_far
+from mdstopo.plots.cloud import FAR_SIZES, planar_cloud, without_far
 from mdstopo.plots.scenery import start_state
 from mdstopo.plots.slack import CORNERS
 
@@ -32,7 +32,7 @@ def test_a_slack_belt_is_seen_where_it_hangs_and_a_taut_one_adds_no_places() -> 
 
 
 def test_what_is_far_off_is_left_out_unless_what_is_looked_at_is_a_single_place() -> None:
-    inner, near, far = (np.array([[0.0, 0.0], [reach, 0.0]]) for reach in (1.0, FAR, 1.01 * FAR))
+    inner, near, far = (np.array([[0.0, 0.0], [reach, 0.0]]) for reach in (1.0, FAR_SIZES, 1.01 * FAR_SIZES))
     assert without_far(inner, far, near) is near
     assert without_far(inner, near, inner) is near
     assert without_far(inner, far) is inner

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
@@ -24,30 +23,11 @@ from mdstopo.robust.robust_measures import estimate, statistic
 from mdstopo.robust.sample import lattice
 from mdstopo.session.run_session import run_session
 from mdstopo.workers.worker_pool import Lost, WorkerError
+from tests.result_files import assert_same_files, datasets_of
 from tests.robust.scenes import PARAMETERS, SCENARIOS, read, scene, text, uncertain
 from tests.tiers import examples
 
 DEVIATION = {"measure": "mean_deviation", "factor": 2}
-
-
-def arrays(path):
-    """Every array and text of a result file but times."""
-    found = {}
-
-    def visit(name, node):
-        if isinstance(node, h5py.Dataset) and "seconds" not in name:
-            found[name] = node[()]
-
-    with h5py.File(path) as file:
-        file.visititems(visit)
-    return found
-
-
-def assert_same(one, other):
-    assert one.keys() == other.keys()
-    for name, value in one.items():
-        floats = getattr(value, "dtype", np.dtype(object)).kind == "f"
-        assert np.array_equal(value, other[name], equal_nan=floats), name
 
 
 def test_no_number_of_processes_changes_a_bit(tmp_path):
@@ -55,17 +35,17 @@ def test_no_number_of_processes_changes_a_bit(tmp_path):
     others = (2, 3)[: examples(1, 2)]
     for workers in (1, *others):
         mdstopo.optimize(case, path=tmp_path / f"{workers}.h5", workers=workers)
-    one = arrays(tmp_path / "1.h5")
+    one = datasets_of(tmp_path / "1.h5")
     assert one["iterations/objectives"].shape[0] > 3
     for workers in others:
-        assert_same(one, arrays(tmp_path / f"{workers}.h5"))
+        assert_same_files(tmp_path / "1.h5", tmp_path / f"{workers}.h5")
 
 
 def test_several_starts_on_several_processes_are_the_same(tmp_path):
     case = read(uncertain(DEVIATION), optimizer={"starts": 2, "max_iterations": 5})
     for workers in (1, 2):
         mdstopo.optimize(case, path=tmp_path / f"{workers}.h5", workers=workers)
-    assert_same(arrays(tmp_path / "1.h5"), arrays(tmp_path / "2.h5"))
+    assert_same_files(tmp_path / "1.h5", tmp_path / "2.h5")
 
 
 def test_a_run_that_is_stopped_goes_on_to_the_same_end(tmp_path):
@@ -79,7 +59,7 @@ def test_a_run_that_is_stopped_goes_on_to_the_same_end(tmp_path):
 
     assert mdstopo.optimize(case, path=tmp_path / "parts.h5", stop_requested=stop).status == "interrupted"
     mdstopo.optimize(case, path=tmp_path / "parts.h5", resume=True, workers=2)
-    assert_same(arrays(tmp_path / "whole.h5"), arrays(tmp_path / "parts.h5"))
+    assert_same_files(tmp_path / "whole.h5", tmp_path / "parts.h5")
 
 
 def test_a_run_is_not_resumed_with_another_sample(tmp_path):
@@ -94,7 +74,7 @@ def test_a_run_is_not_resumed_with_another_sample(tmp_path):
 def test_the_file_holds_the_sample_and_what_became_of_it(tmp_path):
     case = read(uncertain(DEVIATION))
     result = mdstopo.optimize(case, path=tmp_path / "run.h5")
-    found = arrays(tmp_path / "run.h5")
+    found = datasets_of(tmp_path / "run.h5")
     values = found["uncertainty/objectives"][:, 0]
     assert result.objectives["G"] == pytest.approx(values.mean() + 2.0 * values.std(), rel=1e-14)
     assert found["uncertainty/robust"][0] == result.objectives["G"]
@@ -138,7 +118,7 @@ def test_forces_that_compete_at_several_points_end_where_those_of_one_do():
 
 @pytest.mark.parametrize("room", [20_000_000, 100])
 def test_points_are_asked_for_the_peaks_that_memory_has_room_for(room, monkeypatch):
-    monkeypatch.setattr(ensemble, "ROOM", room)
+    monkeypatch.setattr(ensemble, "ROOM_FOR_GRADIENTS", room)
     section = {"scenarios": {"one": {}, "other": {}}, "objectives": {"f": {"measure": "worst"}}}
     case = wires(uncertainty=section)
     engine = evaluator_of(case)
@@ -255,7 +235,7 @@ def test_where_no_worker_survives_what_was_reached_is_kept(tmp_path, monkeypatch
     with pytest.raises(WorkerError, match=r"a worker process \(pid \d+\) ended unexpectedly"):
         mdstopo.optimize(case, path=tmp_path / "run.h5", workers=2)
     monkeypatch.undo()
-    assert arrays(tmp_path / "run.h5")["iterations/objectives"].shape[0] >= 1
+    assert datasets_of(tmp_path / "run.h5")["iterations/objectives"].shape[0] >= 1
     resumed = mdstopo.optimize(case, path=tmp_path / "run.h5", resume=True)
     assert np.array_equal(resumed.alpha, mdstopo.optimize(case).alpha)
 

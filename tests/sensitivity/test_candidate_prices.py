@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from mdstopo.case.reader import read_case
 from mdstopo.case.scene.candidates import spread, with_members
 from mdstopo.engine import Evaluator
 from mdstopo.sensitivity.candidate_pass import SAMPLE, SMOOTH_ERROR
 from mdstopo.sensitivity.springs_candidate_prices import BEST, COMPUTED, ERROR, SEEN
 from mdstopo.sensitivity.tile_interpolation import BROAD, TALL
+from tests.reading import case_from
 
 #: relative to the largest
 AGREE = 1e-10
@@ -81,7 +81,7 @@ SCENES = {
 
 def priced(scene):
     """The case, its candidates' pairs, what rows ask of them, and the gradient of all of them at the same design."""
-    case = read_case(json.dumps({"format": 1, **scene}))
+    case = case_from(scene)
     group = case.members[0]
     i, j = np.divmod(np.arange(group.candidates.count), len(group.to_local))
     length = np.hypot(*(group.to_world[j] - group.from_world[i]).T)
@@ -113,7 +113,7 @@ def test_prices_are_the_gradient_of_candidates_that_are_built(name):
 
 def test_all_methods_differentiate_by_the_members_that_are_built():
     """Though a case that names another method than the adjoint one cannot price the others."""
-    evaluator = Evaluator(read_case(json.dumps({"format": 1, **SCENES["max"]})))
+    evaluator = Evaluator(case_from(SCENES["max"]))
     alpha = np.random.default_rng(5).uniform(0.1, 1.0, evaluator.case.n_design)
     usual = evaluator.evaluate(alpha).gradients["G"]
     direct = evaluator.evaluate(alpha, sensitivity="direct").gradients["G"]

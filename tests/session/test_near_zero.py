@@ -5,9 +5,8 @@ import pytest
 
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.session import run_session
-from mdstopo.session.near_zero import ADDED, SQUARED, near_zero
-from mdstopo.starts.callbacks import ignore, never
+from mdstopo.session import near_zero as near_zero_module
+from mdstopo.session.near_zero import ADDED, SQUARED, NearZeroNotice, near_zero
 
 #: a lamp that hangs 1e-11 m beside the vertical below the hook of a hull that goes up and down; what it sways by is
 #: hardly more than rounding
@@ -66,11 +65,11 @@ def test_what_is_no_integral_is_not_told(over_time: str) -> None:
 
 def test_a_run_says_so_once_as_soon_as_it_is_so(monkeypatch: pytest.MonkeyPatch) -> None:
     found = iter(["", "slow", "slow"])
-    monkeypatch.setattr(run_session, "near_zero", lambda case, engine: next(found))
+    monkeypatch.setattr(near_zero_module, "near_zero", lambda case, engine: next(found))
     said: list[str] = []
-    run = run_session._Run(read_case(LAMP.replace("RESPONSE", SWAY)), None, ignore, never, said.append, "")
-    run.tell_near_zero()
-    run.watched = Evaluator(run.case, in_background=False)
+    notice = NearZeroNotice(read_case(LAMP.replace("RESPONSE", SWAY)), None, said.append)
+    notice.look()
+    assert said == []
     for _ in range(3):
-        run.tell_near_zero()
+        notice.look()
     assert said == ["warning: slow"]

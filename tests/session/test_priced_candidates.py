@@ -27,7 +27,8 @@ from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus, Status
 from mdstopo.store.result_reader import read_result
 from mdstopo.store.stored_case import case_of
-from tests.session.test_runs_and_files import assert_same_files, stop_after
+from tests.reading import case_from
+from tests.result_files import assert_same_files, stop_after
 
 MOUNTS, FRAME = 16, 40
 
@@ -72,15 +73,11 @@ def stiff(candidates: str = "priced") -> dict[str, Any]:
     return scene
 
 
-def case_from(scene: dict[str, Any]) -> Case:
-    return read_case(json.dumps(scene))
-
-
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs begin with some 40 of the 640 candidates, and a few enter at once."""
     monkeypatch.setattr(candidates, "START_SET", 40)
-    monkeypatch.setattr(pricing, "MOST", 20)
+    monkeypatch.setattr(pricing, "MOST_ENTERING", 20)
 
 
 def by_points(outcome: Outcome) -> dict[tuple[int, int], float]:

@@ -25,36 +25,11 @@ from mdstopo.store.result_reader import read_result
 from mdstopo.store.store_errors import DamagedError, DifferentCaseError, InUseError, UnfinishedError, WriteError
 from mdstopo.workers.worker_pool import WorkerError
 from tests.fakes import DyingEngine, DyingOnceEngine, FakeEngineWithEvaluations, hand_made_case, limited
-
-WALL_TIMES = ("seconds", "created", "command")
+from tests.result_files import assert_same_files, stop_after
 
 
 def go(case: Case, path: Path | None, **options: Any) -> Outcome:
     return run_session(case, path=path, engine=FakeEngineWithEvaluations, **options)
-
-
-def stop_after(iterations: int) -> Any:
-    asked = iter(range(10**6))
-    return lambda: next(asked) > iterations
-
-
-def assert_same_files(one: Path, other: Path) -> None:
-    """Every dataset and root attribute equal to the bit, wall times aside."""
-    with h5py.File(one, "r") as a, h5py.File(other, "r") as b:
-        names: list[str] = []
-        a.visititems(lambda name, node: names.append(name) if isinstance(node, h5py.Dataset) else None)
-        others: list[str] = []
-        b.visititems(lambda name, node: others.append(name) if isinstance(node, h5py.Dataset) else None)
-        assert names == others
-        assert dict(a.attrs) == dict(b.attrs)
-        assert dict(a["settings"].attrs) == dict(b["settings"].attrs)
-        for name in names:
-            if name.rpartition("/")[2] in WALL_TIMES:
-                continue
-            x, y = a[name][()], b[name][()]
-            assert np.asarray(x).shape == np.asarray(y).shape, name
-            same = x == y if isinstance(x, bytes) else np.asarray(x).tobytes() == np.asarray(y).tobytes()
-            assert same, name
 
 
 def test_a_run_writes_the_iterations_the_contract_names(case: Case, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from mdstopo.status import Status
 @pytest.fixture(autouse=True)
 def small_searches(monkeypatch):
     """Few choices are fewer here, so that branch and bound has something to do in little time."""
-    monkeypatch.setattr(size_search, "FEW", 1000)
+    monkeypatch.setattr(size_search, "FEW_CHOICES", 1000)
 
 
 class Springs:
@@ -75,7 +75,7 @@ def nothing(found):
 @pytest.mark.parametrize("seed", range(6))
 def test_branch_and_bound_finds_the_best_of_all_choices(seed):
     problem, sizes = Springs(seed, 7, 0.4, equal=seed % 2 == 0), [0.0, 0.4, 1.0]
-    assert len(sizes) ** 7 > size_search.FEW
+    assert len(sizes) ** 7 > size_search.FEW_CHOICES
     found = search_of(problem, sizes).run(never, nothing)
     assert found.finished
     assert not found.exhaustive
@@ -142,7 +142,7 @@ def test_a_search_that_is_stopped_among_the_last_neighbours_goes_on_to_the_same_
             return Sample(value, np.array([value]), slope, np.zeros(0), np.zeros((0, 4)), status=Status.OK)
 
     problem, sizes, asked, seen = Waves(3, 4, 0.45), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], [], []
-    assert len(sizes) ** 4 > size_search.FEW
+    assert len(sizes) ** 4 > size_search.FEW_CHOICES
 
     def ask():
         asked.append(0)

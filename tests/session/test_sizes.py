@@ -76,7 +76,7 @@ def kept_of(outcome, sizes):
 
 @pytest.mark.parametrize("few", [300, 10], ids=["all choices", "branch and bound"])
 def test_the_sizes_of_a_run_are_the_best_of_all_choices(few, tmp_path, monkeypatch):
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", few)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", few)
     case = case_with("[0, 0.4, 1]")
     outcome = run_session(case, path=tmp_path / "r.h5")
     kept = kept_of(outcome, [0.0, 0.4, 1.0])
@@ -108,7 +108,7 @@ def test_few_choices_for_all_members_are_all_evaluated():
 
 @pytest.mark.parametrize("few", [100, 10], ids=["all choices", "branch and bound"])
 def test_behind_a_poor_choice_for_the_members_kept_others_are_allowed_sizes_too(few, monkeypatch):
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", few)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", few)
     monkeypatch.setattr("mdstopo.session.sizes.MUCH_WORSE", 0.01)
     monkeypatch.setattr("mdstopo.session.sizes.OTHERS", 3)
     case, said = case_with("[0, 1]"), []
@@ -162,7 +162,7 @@ def test_prices_count_beside_limits_on_responses(tmp_path):
 
 @pytest.mark.parametrize("few", [300, 10], ids=["all choices", "branch and bound"])
 def test_members_that_are_not_kept_pay_for_the_least_size(few, monkeypatch):
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", few)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", few)
     monkeypatch.setattr("mdstopo.session.sizes.MUCH_WORSE", 1.0)
     sizes, prices = [0.0, 0.4, 1.0], [0.2, 0.7, 1.2]
     case = case_with("{sizes: [0, 0.4, 1], prices: [0.2, 0.7, 1.2]}")
@@ -201,7 +201,7 @@ def test_members_of_one_alpha_have_one_size():
 @pytest.mark.parametrize("sizes", ["[0, 1]", "[0, 0.4, 1]"])
 def test_a_choice_of_sizes_says_how_far_it_is_between_evaluations_too(sizes, monkeypatch):
     """Where all choices are tried there are no nodes; elsewhere the neighbours of the best are tried last."""
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", 10)
     monkeypatch.setattr("mdstopo.session.sizes.SAID_EVERY", 0.0)
     monkeypatch.setattr("mdstopo.session.sizes.MUCH_WORSE", 1.0)
     told = []
@@ -216,7 +216,7 @@ def test_a_choice_of_sizes_says_how_far_it_is_between_evaluations_too(sizes, mon
 
 
 def test_a_long_choice_of_sizes_tells_its_nodes_and_the_best(monkeypatch):
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", 10)
     monkeypatch.setattr("mdstopo.session.sizes.SAID_EVERY", 0.0)
     told = []
     outcome = run_session(case_with("[0, 0.4, 1]"), notify=told.append)
@@ -229,7 +229,7 @@ def test_a_long_choice_of_sizes_tells_its_nodes_and_the_best(monkeypatch):
 
 
 def test_a_stopped_choice_is_kept_and_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", 10)
     case = case_with("[0, 0.4, 1]")
     whole = run_session(case, path=tmp_path / "whole.h5")
     told, asked = [], []
@@ -357,7 +357,7 @@ solver: {tolerance: 1e-8}
 
 def test_members_that_are_next_to_nothing_get_a_size_where_without_them_a_limit_is_broken(monkeypatch):
     """The run ended as failed: the spring along y has a size below half of 0.4, and was left out."""
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", 10)
     case = read_case(CROSSED)
     without = run_session(replace(case, members=tuple(replace(group, sizes=()) for group in case.members)))
     assert 0.01 < without.alpha[1] < 0.2
@@ -378,7 +378,7 @@ def test_members_that_are_next_to_nothing_get_a_size_where_without_them_a_limit_
 
 @pytest.mark.parametrize("stopped", [6, 9, 11, 14])
 def test_a_choice_that_went_on_with_all_members_goes_on_where_it_was_stopped(tmp_path, stopped, monkeypatch):
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", 10)
     case = read_case(CROSSED)
     whole = run_session(case, path=tmp_path / "whole.h5")
     asked = 0
@@ -405,7 +405,7 @@ def test_a_choice_that_went_on_with_all_members_goes_on_where_it_was_stopped(tmp
 
 @pytest.mark.parametrize("stopped", [2, 8, 40, 150])
 def test_a_choice_that_went_on_behind_a_poor_one_goes_on_where_it_was_stopped(tmp_path, stopped, monkeypatch):
-    monkeypatch.setattr("mdstopo.session.size_search.FEW", 10)
+    monkeypatch.setattr("mdstopo.session.size_search.FEW_CHOICES", 10)
     monkeypatch.setattr("mdstopo.session.sizes.MUCH_WORSE", 0.01)
     case = case_with("[0, 1]")
     whole = run_session(case, path=tmp_path / "whole.h5")

@@ -11,7 +11,7 @@ from mdstopo.session.run_session import run_session
 from mdstopo.starts import quotas
 from mdstopo.store.result_reader import read_result
 from tests.fakes import FakeEngineWithEvaluations, hand_made_case, limited
-from tests.session.test_runs_and_files import assert_same_files, stop_after
+from tests.result_files import assert_same_files, stop_after
 
 STARTS = 6
 

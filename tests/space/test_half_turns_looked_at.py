@@ -76,7 +76,7 @@ def test_a_motion_without_gradients_needs_no_room_for_what_only_these_need(monke
     driver = evaluator.driver("default")
     most = 10 * len(driver.room)
     monkeypatch.setattr("mdstopo.case.memory.most_floats", lambda: most)
-    monkeypatch.setattr("mdstopo.general.driver.general_driver.LARGE", 0)
+    monkeypatch.setattr("mdstopo.general.driver.general_driver.LARGE_HISTORY", 0)
     assert evaluator.evaluate(case.initial).status is Status.STEP_LIMIT
     alone = evaluator.evaluate(case.initial, gradient=False)
     assert alone.objectives == ample.objectives

@@ -25,8 +25,7 @@ def notices() -> list[str]:
 def make_result(tmp_path: Path) -> Callable[..., Path]:
     """Writes a small result file and returns its path."""
     from mdstopo.store.atomic import replace_file
-    from mdstopo.store.contents import case_part, result_image
-    from mdstopo.store.provenance import Provenance
+    from mdstopo.store.contents import Contents, case_part, result_image
 
     def make(status: str = "converged", kind: str = "run", name: str = "probe.h5", **changes: Any) -> Path:
         case = hand_made_case(**changes)
@@ -36,10 +35,8 @@ def make_result(tmp_path: Path) -> Callable[..., Path]:
             "optimizer/0/alpha": np.linspace(0.1, 0.6, 6),
         }
         path = tmp_path / name
-        replace_file(
-            path,
-            result_image(case, kind, status, "a reason", datasets, Provenance.collect("mdstopo run"), {"seed": 3}),
-        )
+        contents = Contents.begun(case, kind, "mdstopo run", datasets, {"seed": 3})
+        replace_file(path, result_image(contents.now(status, "a reason", {})))
         return path
 
     return make

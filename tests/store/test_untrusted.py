@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mdstopo.store import writing
+from mdstopo.store.contents import Contents
 from mdstopo.store.image import encode
 from mdstopo.store.result_reader import read_result
 from mdstopo.store.seal import lookup3, right_superblock
@@ -185,17 +186,16 @@ def test_what_cannot_be_read_back_replaces_nothing(
     make_result: MakeResult, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """As with a library that writes what it cannot read."""
-    from mdstopo.store.provenance import Provenance
     from tests.fakes import hand_made_case
 
     path = make_result()
     before = path.read_bytes()
-    case, provenance = hand_made_case(), Provenance.collect()
+    contents = Contents.begun(hand_made_case(), "run", "", {"design/alpha": np.ones(6)})
     good = writing.result_image
     broken: Callable[..., bytes] = lambda *given: good(*given).replace(b"OHDR", b"OHDX")  # noqa: E731
     monkeypatch.setattr(writing, "result_image", broken)
     with pytest.raises(UnreadableError, match=r"cannot be read back .*h5py \d"):
-        writing.write_result(path, case, "run", "running", "", {"design/alpha": np.ones(6)}, provenance, {})
+        writing.write_result(path, contents)
     assert path.read_bytes() == before
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
 

@@ -171,6 +171,22 @@ def test_the_first_checkpoint_of_a_large_case_waits_for_work_worth_it() -> None:
     assert saver.offer()
 
 
+def test_a_checkpoint_that_cannot_be_written_is_told_and_does_not_end_the_work() -> None:
+    def save() -> None:
+        raise WriteError("the disk is full")
+
+    clock = Clock()
+    said: list[str] = []
+    saver = Checkpointer(save, clock=clock, notify=said.append)
+    for _ in range(2):
+        clock.now += 2.0 * INTERVAL
+        assert saver.offer()
+    assert said == ["no checkpoint: the disk is full"] * 2
+    clock.now += 2.0 * INTERVAL
+    with pytest.raises(WriteError):
+        Checkpointer(save, clock=Clock()).offer(urgent=True)
+
+
 @pytest.mark.parametrize("how", ["symbolic", "dangling", "hard"])
 def test_a_lock_is_never_another_file(how: str, tmp_path: Path) -> None:
     """What a link in its place points to would be emptied."""

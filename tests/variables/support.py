@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.session.run_session import run_session
+from tests.reading import case_of
 
 #: objectives and a constraint of a scene with the body `m` and the group of members `t`
 OBJECTIVES = """\
@@ -30,10 +30,6 @@ points:
   right: {body: frame, grid: {line: {from: [1, 0], to: [1, 1], count: 3}}}
   belt: {body: load, grid: {list: [[-0.2, 1], [0.2, 1]]}}
 """
-
-
-def case_of(text, **solver):
-    return read_case(text, overrides={f"solver.{key}": str(value) for key, value in solver.items()})
 
 
 def with_variables(text, group, parameters, **solver):

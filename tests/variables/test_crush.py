@@ -13,8 +13,9 @@ from mdstopo.case.text.errors import CaseError
 from mdstopo.engine import Evaluator
 from mdstopo.status import Status
 from tests.general.support import CASES
+from tests.reading import case_of
 from tests.tiers import examples
-from tests.variables.support import case_of, differences, whole, widths
+from tests.variables.support import differences, whole, widths
 
 ONE = """
 format: 1

@@ -11,13 +11,13 @@ from mdstopo.case.model import VolumeRow
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.text.errors import CaseError
 from mdstopo.case.text.yaml_text import text_of
-from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.finalize_design import ready
 from mdstopo.finalize.keep import chosen, kept_values, one_alpha, places, restricted
 from mdstopo.finalize.parameter_values import bound_of, with_valid_times
+from tests.commands import call
 
 #: a stiffness for all, which costs; springs and energy alone, so that the final case needs no general kernels
 STIFFNESS = """\
@@ -88,12 +88,6 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("stiffness.yaml").write_text(STIFFNESS)
     Path("parts.yaml").write_text(PARTS)
-
-
-def call(capsys, *words: str) -> tuple[int, str, str]:
-    status = run_group(list(words))
-    said = capsys.readouterr()
-    return status, said.out, said.err
 
 
 def design_of(case, seed: int = 3) -> np.ndarray:

@@ -22,6 +22,7 @@ from mdstopo.robust.sampled_case import case_at
 from mdstopo.scene.design_map import as_designed
 from mdstopo.session.run_session import run_session
 from mdstopo.store.result_reader import read_result
+from tests.reading import case_of
 from tests.variables.support import OBJECTIVES, differences, whole, whole_and_resumed, widths
 
 SCENE = """
@@ -69,10 +70,6 @@ members:
 design: {initial: 0.8, variables: {VARIABLES}}
 """
 SPRINGS += OBJECTIVES
-
-
-def case_of(text: str, **solver: object) -> Case:
-    return read_case(text, overrides={f"solver.{key}": str(value) for key, value in solver.items()})
 
 
 def check(case: Case, bound: float, size: float = 3e-4) -> None:

@@ -4,7 +4,6 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -18,6 +17,7 @@ from mdstopo.case.text.errors import CaseError
 from mdstopo.session.outcome import Outcome
 from mdstopo.session.run_session import run_session
 from mdstopo.status import RunStatus
+from tests.result_files import assert_same_files
 
 #: a body on springs all around it, pushed to the side and turned
 SCENE = """
@@ -34,7 +34,6 @@ objectives: {sway: {response: {displacement: {body: unit, at: [0.1, 0.1]}}, over
 constraints: [{volume: all, limit: 6}]
 optimizer: {max_iterations: 25, tolerance: 1e-6}
 """
-FILES_DIFFER = ("seconds", "created", "command")
 
 
 def staged(power: str = "[1, 3]", **changes: object) -> Case:
@@ -49,20 +48,6 @@ def grey(outcome: Outcome) -> int:
 def stop_after(count: int):
     reached: list[int] = []
     return {"on_iteration": lambda progress: reached.append(0), "stop_requested": lambda: len(reached) >= count}
-
-
-def assert_same_files(one: Path, other: Path) -> None:
-    with h5py.File(one) as a, h5py.File(other) as b:
-        names: list[list[str]] = [[], []]
-        for file, found in zip((a, b), names, strict=True):
-            file.visititems(
-                lambda name, node, found=found: found.append(name) if isinstance(node, h5py.Dataset) else None
-            )
-        assert names[0] == names[1]
-        assert a.attrs["status"] == b.attrs["status"]
-        for name in names[0]:
-            if name.rpartition("/")[2] not in FILES_DIFFER:
-                assert np.asarray(a[name][()]).tobytes() == np.asarray(b[name][()]).tobytes(), name
 
 
 def test_a_higher_power_in_a_second_stage_leaves_fewer_members_between():

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.objects.aims import Following, Follows
+from mdstopo.case.objects.problem_parts import Following, Follows
 from mdstopo.formula.calculus import derivative, substituted
 from mdstopo.formula.formula_values import value_of, values_of
 from mdstopo.formula.parser import parse

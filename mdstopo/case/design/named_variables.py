@@ -15,7 +15,7 @@ from mdstopo.case.design.movable import is_of_use
 from mdstopo.case.keys.definitions import MARK, SECTION, is_kept_as_text
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import MemberGroup
-from mdstopo.case.objects.aims import Following, Follows, Variable
+from mdstopo.case.objects.problem_parts import Following, Follows, Variable
 from mdstopo.case.text.key_paths import stated_variables
 from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.text.reading import Fields, Reading

@@ -138,7 +138,8 @@ def _filled(cells: Sequence[str]) -> int:
 
 
 def odd_row(table: TextTable, last: int, named: bool) -> str:
-    """Which row has other cells than there are columns, so that nobody knows which cell belongs to which; empty: none.
+    """A sentence on the first row whose number of cells is not that of the columns, so that it is open which cell is of
+    which column; empty where there is none.
 
     last: the last column that is read. named: whether a column is found by its name; else places in the rows count,
     and between semicolons and tabs these are never in doubt.

@@ -19,7 +19,7 @@ from mdstopo.case.value import Value, frozen
 #: by how much stated probabilities may miss the sum 1: thirds are written 0.333
 ROUNDED = 0.01
 #: the largest deviation of a lognormal number, relative to its mean; the square of more is too large for a number
-WIDEST = 1e100
+WIDEST_DEVIATION = 1e100
 _UNIT = "the number's unit"
 
 
@@ -121,8 +121,8 @@ class Lognormal(Distribution):
         if mean <= 0.0:
             reading.mistake(path, f"found the mean {number_text(mean)}, allowed is a number > 0")
             return None
-        if not stated["deviation"] <= WIDEST * mean:
-            found, most = number_text(stated["deviation"]), number_text(WIDEST)
+        if not stated["deviation"] <= WIDEST_DEVIATION * mean:
+            found, most = number_text(stated["deviation"]), number_text(WIDEST_DEVIATION)
             told = f"found {found}, allowed is at most {most} times the mean {number_text(mean)}"
             reading.mistake(inside(path, "deviation"), told)
             return None

@@ -1,1 +1,1 @@
-"""What a case is made of: immutable parts, aims, settings; where bodies are at the start."""
+"""What a case is made of: immutable parts of scenes and of the problem, settings; where bodies are at the start."""

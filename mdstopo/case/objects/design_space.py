@@ -19,10 +19,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.objects.aims import Variable, VolumeRow
+from mdstopo.case.objects.problem_parts import Variable, VolumeRow
 
 #: the largest bound of alphas that are counted in a unit of their own
-SMALL = 0.25
+SMALL_BOUND = 0.25
 
 
 class DesignSpace:
@@ -137,10 +137,10 @@ def units_of(
     """(N,) what alphas are counted in, from the bounds and the numbers of members of design groups; None where in 1.
 
     The least power of two that is not below the larger bound: whichever it is, the optimiser sees the same to the bit.
-    1 where that bound is above `SMALL` or 0. Alphas that are one, by slots (N,), take the smallest unit of theirs.
+    1 where that bound is above `SMALL_BOUND` or 0. Alphas that are one, by slots (N,), take the smallest unit of all.
     """
     largest = [max(abs(lower), abs(upper)) for lower, upper in bounds]
-    units = [2.0 ** math.ceil(math.log2(size)) if 0.0 < size <= SMALL else 1.0 for size in largest]
+    units = [2.0 ** math.ceil(math.log2(size)) if 0.0 < size <= SMALL_BOUND else 1.0 for size in largest]
     if all(unit == 1.0 for unit in units):
         return None
     found: FloatArray = np.repeat(units, counts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mdstopo.case.methods.losses import DEFAULT_LOSS
-from mdstopo.case.objects.aims import Response
+from mdstopo.case.objects.problem_parts import Response
 from mdstopo.case.value import Value, frozen
 
 #: a column of a file: its name in the header line, or its place from 0

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from mdstopo.case.keys.formula_keys import FormulaNames, FormulaText
 from mdstopo.case.keys.kinds import NUMBER, Kind, Text
 from mdstopo.case.keys.records import Key, Record
-from mdstopo.case.objects.aims import Response
 from mdstopo.case.objects.frames import Frames
+from mdstopo.case.objects.problem_parts import Response
 from mdstopo.case.text.reading import Fields, Reading
 from mdstopo.case.text.words import inside
 from mdstopo.formula.formula_error import FormulaError

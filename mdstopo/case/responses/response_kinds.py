@@ -14,8 +14,8 @@ from mdstopo.case.keys.common_keys import BODY, FRAME, GROUP, IN_SPACE, PAIR
 from mdstopo.case.keys.kinds import Ref, Word, explained
 from mdstopo.case.keys.records import ByShape, Key, Record
 from mdstopo.case.methods.over_time import DEFAULT_REDUCTION, REDUCTIONS
-from mdstopo.case.objects.aims import Response
 from mdstopo.case.objects.frames import Frames
+from mdstopo.case.objects.problem_parts import Response
 from mdstopo.case.responses.expression_response import expression_keys, make_expression
 from mdstopo.case.text.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.text.reading import BAD, Fields, Reading, found

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from mdstopo.case.methods.over_time import REDUCTIONS
-from mdstopo.case.objects.aims import Objective, Response, ResponseRow, VolumeRow
+from mdstopo.case.objects.problem_parts import ReducedResponse, Response, ResponseRow, VolumeRow
 from mdstopo.case.responses.response_kinds import kind_of
 
 if TYPE_CHECKING:
@@ -18,9 +18,9 @@ def unit_of(response: Response) -> str:
     return response.unit or kind_of(response).unit
 
 
-def unit_of_value(aim: Objective | ResponseRow) -> str:
+def unit_of_value(reduced: ReducedResponse) -> str:
     """The unit of a response reduced over time."""
-    return REDUCTIONS[aim.over_time].unit_from(unit_of(aim.response))
+    return REDUCTIONS[reduced.over_time].unit_from(unit_of(reduced.response))
 
 
 def words(response: Response) -> str:

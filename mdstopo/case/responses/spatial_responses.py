@@ -8,8 +8,8 @@ from mdstopo.case.geometry.start_rotations import unit
 from mdstopo.case.keys.common_keys import DIRECTION, FRAME, TRIPLE
 from mdstopo.case.keys.kinds import explained
 from mdstopo.case.keys.records import Key, Record
-from mdstopo.case.objects.aims import Response
 from mdstopo.case.objects.frames import Frames
+from mdstopo.case.objects.problem_parts import Response
 from mdstopo.case.responses.response_kinds import (
     OF_BODY,
     RELATIVE,

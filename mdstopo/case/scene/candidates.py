@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.arrays import FloatArray, IndexArray
-from mdstopo.case.objects.aims import VolumeRow
+from mdstopo.case.objects.problem_parts import VolumeRow
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case, MemberGroup

@@ -76,7 +76,7 @@ def _computable(value: float, path: str, reading: Reading) -> bool:
 
 
 def _inertia(stated: Any, path: str, reading: Reading) -> FloatArray | None:
-    """The tensor (3, 3); None where no body has it, which is noted."""
+    """The tensor (3, 3); None where no body can have it: the mistake is noted."""
     tensor = np.array(stated, dtype=np.float64)
     if tensor.ndim == 1:
         tensor = np.diag(tensor)

@@ -6,7 +6,7 @@ import math
 
 from mdstopo.case.objects.fitting import Estimate, Fit, FitNumber, Series
 from mdstopo.case.objects.frames import Frames
-from mdstopo.case.sections.goals import build_response, load_case_of
+from mdstopo.case.sections.problem_sections import build_response, load_case_of
 from mdstopo.case.text.key_paths import SECTIONS, led_to, number_at, why_fixed
 from mdstopo.case.text.nodes import Node
 from mdstopo.case.text.overrides import WrongPathError, steps_of

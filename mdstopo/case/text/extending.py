@@ -15,7 +15,7 @@ from mdstopo.case.text.words import shown
 from mdstopo.case.text.yaml_text import text_of
 
 KEY = "extends"
-DEEPEST = 10
+DEEPEST_CHAIN = 10
 """Cases that extend each other, one the next."""
 
 
@@ -58,8 +58,8 @@ def _extended(root: Node, folder: Path, above: list[Path], way: Path, reading: R
     if any(_same(base, each) for each in above):
         names = " -> ".join(each.name for each in chain)
         raise _cannot(reading, f"is extended by itself: {names}", node)
-    if len(chain) > DEEPEST:
-        raise _cannot(reading, f"more than {DEEPEST} cases extend each other", node)
+    if len(chain) > DEEPEST_CHAIN:
+        raise _cannot(reading, f"more than {DEEPEST_CHAIN} cases extend each other", node)
     try:
         text, _ = text_in(base)
     except FileTextError as error:

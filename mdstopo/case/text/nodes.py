@@ -15,7 +15,7 @@ from mdstopo.case.text.scalars import Scalar, resolve
 from mdstopo.case.text.words import count_text, inside, shown
 
 SCALAR, SEQUENCE, MAPPING = "scalar", "sequence", "mapping"
-DEEPEST = 50
+DEEPEST_NESTING = 50
 MOST_EXPANDED = 5_000_000
 
 
@@ -140,8 +140,10 @@ class _Builder:
             else:
                 node = self._open(event)
                 if node.kind != SCALAR and not isinstance(event, yaml.AliasEvent):
-                    if len(stack) >= DEEPEST:
-                        raise YamlSyntaxError(self._mistake(event.start_mark, f"nested deeper than {DEEPEST} levels"))
+                    if len(stack) >= DEEPEST_NESTING:
+                        raise YamlSyntaxError(
+                            self._mistake(event.start_mark, f"nested deeper than {DEEPEST_NESTING} levels")
+                        )
                     self.unfinished.add(id(node))
                     stack.append((node, []))
                     continue
@@ -228,7 +230,7 @@ class _Builder:
         if mark is not None:
             problem = error.problem or error.context or "cannot be read"
             if "nesting depth" in problem:  # newer parsers count, too, and look ahead
-                return YamlSyntaxError(self._mistake(mark, f"nested deeper than {DEEPEST} levels"))
+                return YamlSyntaxError(self._mistake(mark, f"nested deeper than {DEEPEST_NESTING} levels"))
             begun = getattr(error, "context_mark", None)
             context = ""
             if error.context and begun is not None:

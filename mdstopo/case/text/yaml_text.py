@@ -10,7 +10,7 @@ from typing import Any
 from mdstopo.case.text.overrides import as_yaml
 from mdstopo.case.text.scalars import resolve
 
-LONGEST = 118
+LONGEST_LINE = 118
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 #: words that other readers of YAML do not take for text
 _OTHER = re.compile(r"(?i)y|n|yes|no|on|off|true|false|null")
@@ -33,7 +33,7 @@ def _block(value: Any, indent: str, depth: int) -> Iterator[str]:
     for head, part in parts:
         line = f"{indent}{head} {_flow(part)}"
         nested = isinstance(part, (Mapping, list, tuple)) and len(part) > 0
-        if not nested or (len(line) <= LONGEST and not (depth < _OPEN and _deep(part))):
+        if not nested or (len(line) <= LONGEST_LINE and not (depth < _OPEN and _deep(part))):
             yield line
             continue
         lines = _block(part, indent + "  ", depth + 1)

@@ -79,10 +79,10 @@ class Lower(NumbaLower):
         return super().loadvar(name) if held is None else held
 
     def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
-        self._values.pop(name, None)  # what it held before, which is let go of, is read from memory
+        self._values.pop(name, None)  # its previous value, whose reference is released below, is read from memory
         if argidx is None and name not in self._singly_assigned_vars and not self._is_counted(name):
             self._alloca_var(name, self.typeof(name))
-            self.builder.store(value, self.getvar(name))  # nothing is let go of
+            self.builder.store(value, self.getvar(name))  # without a reference to release
         else:
             super().storevar(value, name, argidx)
         if name in self._held:

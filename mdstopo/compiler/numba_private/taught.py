@@ -163,11 +163,11 @@ class _Crew:
 
     def __init__(self, build: Any, wanted: Any, body: Any, argument: Any) -> None:
         self._build = build
-        most = llvm_ir.Constant(_WORD, threads.MOST)
+        most = llvm_ir.Constant(_WORD, threads.MOST_THREADS)
         fits = build.icmp_signed("<", wanted, most)
         self._count = build.sub(build.select(fits, wanted, most), llvm_ir.Constant(_WORD, 1))
-        self._names = cgutils.alloca_once(build, _WORD, threads.MOST)
-        self._refused = cgutils.alloca_once(build, _SMALL, threads.MOST)
+        self._names = cgutils.alloca_once(build, _WORD, threads.MOST_THREADS)
+        self._refused = cgutils.alloca_once(build, _SMALL, threads.MOST_THREADS)
         create = cgutils.get_or_insert_function(build.module, _CREATE, "pthread_create")
         with cgutils.for_range(build, self._count) as loop:
             name = build.gep(self._names, [loop.index])

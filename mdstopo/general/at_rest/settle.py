@@ -23,7 +23,7 @@ from mdstopo.scene.settled import Settled
 from mdstopo.scene.springs_model import FloatArray
 
 #: pseudo-steps at most, and the farthest that one goes, relative to the scene
-MOST, FAR = 400, 0.1
+MOST_STEPS, LONGEST_STEP = 400, 0.1
 #: the farthest that an equilibrium is looked for: by how many sizes of the scene a body may move, and how far turn, rad
 SIZES, TURN = 2.0, 2.0 * np.pi
 #: steps grow by this factor where the force along them at their end is off from what was foreseen by at most this share
@@ -33,7 +33,7 @@ GROWTH, AGREES = 4.0, 0.25
 #: a better end is looked for
 BACK, TRIALS = 0.1, 30
 #: how near steps must have come for Newton's to take over, and when these have arrived, relative to the scene
-NEAR, ARRIVED = 1e-6, 1e-13
+NEWTON_FROM, ARRIVED = 1e-6, 1e-13
 #: stiffness, relative to the largest, below which a direction counts as free
 FREE = 1e-9
 #: how often what moves freely is moved back at most, and how far from its place or heading it is then at most, relative
@@ -62,7 +62,7 @@ def settle(driver: DriverWithStart, alpha: FloatArray, q0: FloatArray, size: flo
         # what has been pushed away again stays: at the edge of where a slack strap leaves it free
         if far <= KEPT * size or far > limit:
             return _settled(driver, q, change, free.kept(scene.inverse()))
-        step = min(far, FAR * size)
+        step = min(far, LONGEST_STEP * size)
         q = bodies.retract(q, step / far * back)
         limit = far - 0.5 * step
     body = names[_farthest(driver, back, scene.arms)]
@@ -90,12 +90,12 @@ def _downhill(scene: "_AtRest", q: FloatArray, stated: FloatArray, size: float) 
     q = scene.land(q.copy())
     rate, left = scene.rate(), scene.left()
     pace = 1.0 / rate if rate > 0.0 else size / max(float(np.linalg.norm(left)), 1e-300)
-    for _ in range(MOST):
+    for _ in range(MOST_STEPS):
         step = scene.step(1.0 / pace)
         far, own = scene.extent(step), scene.scaled(step)
         ahead = float(own @ left)
-        if far > FAR * size or (ahead < 0.0 and far > ARRIVED * size):
-            pace *= min(max(0.25, 0.5 * FAR * size / far), 0.5)
+        if far > LONGEST_STEP * size or (ahead < 0.0 and far > ARRIVED * size):
+            pace *= min(max(0.25, 0.5 * LONGEST_STEP * size / far), 0.5)
             continue
         q, left, share, off = _stepped(scene, q, step, ahead, float(own @ own) / pace)
         if off <= AGREES * ahead:
@@ -104,7 +104,7 @@ def _downhill(scene: "_AtRest", q: FloatArray, stated: FloatArray, size: float) 
             pace *= 0.5
         if scene.lost(scene.bodies.difference(q, stated)):
             return q, False
-        if share * far <= NEAR * size and pace * scene.rate() > 1.0:
+        if share * far <= NEWTON_FROM * size and pace * scene.rate() > 1.0:
             break
     return q, True
 

@@ -12,8 +12,8 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.design.followed_member import (
     AT_NODES,
     CHANGES,
-    CLOSE,
-    HIGHEST,
+    CLOSE_MARGIN,
+    HIGHEST_POWER,
     NODE_ROWS,
     PIECE,
     degree_of,
@@ -248,7 +248,7 @@ def _fill_shares(when, time, share):
     when (S,): times of the stages (s). time (2,): start and length of the step (s).
     share (NODES, S): out.
     """
-    legendre = np.empty(HIGHEST + 1)
+    legendre = np.empty(HIGHEST_POWER + 1)
     degree = degree_of(when.shape[0], time[1], np.max(when) - time[0])
     for j in range(when.shape[0]):
         x = 2.0 * (when[j] - time[0]) / time[1] - 1.0
@@ -321,7 +321,7 @@ def _follow(model, k, i, time, pose, acc, works, node, power, pieces):
         and law_margin(code, p, high, rate, mode, start, curves, rest) >= 0.0
     ):
         return 0
-    if not law_margin(code, p, x, rate, mode, start, curves, rest) > CLOSE:
+    if not law_margin(code, p, x, rate, mode, start, curves, rest) > CLOSE_MARGIN:
         second = second_rate(model, i, pose, acc)
         mode = np.int64(law_start(code, p, x, rate, second, start, curves, rest))
     for c in range(NODES):

@@ -12,11 +12,13 @@ from mdstopo.mechanics.kinematics.kinematics_interface import ALONG, ELONGATION,
 from mdstopo.mechanics.laws.law_table import law, law_has_pieces, law_is_idle, law_margin, law_next, law_set
 
 #: the highest power of time that virtual changes within a step have, and stages from which on they have it
-HIGHEST, MANY = 3, 8
+HIGHEST_POWER, MANY_STAGES = 3, 8
 #: a step has cubes of time among these, and squares, from this part of the time on over which its stages lie
 CUBES_FROM, SQUARES_FROM = 0.5, 0.1
 #: Legendre's polynomials at the nodes by degree, each times what its moment over a step counts
-AT_NODES = np.polynomial.legendre.legvander(2.0 * NODE - 1.0, HIGHEST) * (2.0 * np.arange(HIGHEST + 1) + 1.0)
+AT_NODES = np.polynomial.legendre.legvander(2.0 * NODE - 1.0, HIGHEST_POWER) * (
+    2.0 * np.arange(HIGHEST_POWER + 1) + 1.0
+)
 #: points and weights of an integral over a piece of a step, as fractions of it (Gauss)
 GAUSS = 0.5 * np.array(np.polynomial.legendre.leggauss(5)) + np.array([[0.5], [0.0]])
 #: what is known of a member at the nodes: the first rows of `member_works`, ELONGATION, RATE and ALONG
@@ -31,7 +33,7 @@ LOCATED = 2.0**-40
 #: the mode in which a curve looks for its piece at each elongation
 ANY_PIECE = 0
 #: a margin below this leaves open in which mode a member begins, and its second derivative decides (m, m/s or a part)
-CLOSE = 1e-6
+CLOSE_MARGIN = 1e-6
 #: a mode is over where its margin is below zero by more than rounding, this part of 1 m and the member's length: right
 #: behind a switch the margin of the new mode is zero, and it would end again at once. What has just been crushed stands
 #: at its plateau, from which it moves away
@@ -48,7 +50,7 @@ def degree_of(stages, length, reach):
     their weights are small. The higher moments of what these stages give all but cancel: in a short step nothing is
     left of them but the error of the method, and rounding.
     """
-    degree = HIGHEST if stages >= MANY else min(stages - 1, HIGHEST - 1)
+    degree = HIGHEST_POWER if stages >= MANY_STAGES else min(stages - 1, HIGHEST_POWER - 1)
     if length < SQUARES_FROM * reach:
         return min(degree, 1)
     return min(degree, 2) if length < CUBES_FROM * reach else degree

@@ -30,7 +30,7 @@ from mdstopo.general.model.general_model import (
 from mdstopo.general.over_time.competing_members import compete, members_peaks
 from mdstopo.general.over_time.minima import minima
 from mdstopo.general.over_time.pieces import Pieces
-from mdstopo.general.over_time.quadrature_breakpoints import ROUNDS, followed_integrals, quadrature_breakpoints
+from mdstopo.general.over_time.quadrature_breakpoints import MOST_LOOKS, followed_integrals, quadrature_breakpoints
 from mdstopo.general.over_time.switch_changes import moving_switches
 from mdstopo.general.over_time.switch_pieces import switched_integral, switched_peaks
 from mdstopo.general.responses.extremes import (
@@ -83,7 +83,7 @@ DAMPING = 1
 TANGENT_AT = 4
 COUNT_AT, WINDOW_AT = 6, 11
 #: from so many numbers on (128 MB) the arrays for steps grow without what only gradients need, where none are wanted
-LARGE = 2**24
+LARGE_HISTORY = 2**24
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -247,7 +247,7 @@ class GeneralDriver:
         tangent: whether gradients are wanted. Where they are not, what they need takes no more room: it is most of it.
         """
         kept = int(self.limits[KEPT])
-        if self.method.kind.explicit and not tangent and kept != NOTHING and len(self.room) > LARGE:
+        if self.method.kind.explicit and not tangent and kept != NOTHING and len(self.room) > LARGE_HISTORY:
             kept, factor = NOTHING, 2.0  # which takes less than before
         else:
             factor = room_factor(len(self.room))
@@ -304,7 +304,7 @@ class GeneralDriver:
         across = self._across() if rows.cones and gradient and self._is_planar else None
         self.quadrature_breakpoints = []
         followed = followed_integrals(self, self.count) if self._integrated and code == OK else {}
-        for _ in range(ROUNDS):
+        for _ in range(MOST_LOOKS):
             more = quadrature_breakpoints(self, self.count, followed) if code == OK else []
             if not more:
                 break

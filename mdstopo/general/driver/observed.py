@@ -13,14 +13,14 @@ from mdstopo.general.driver.general_driver import GeneralDriver
 from mdstopo.general.model.general_model import GeneralModel
 from mdstopo.general.scene.further_times import landed
 from mdstopo.integrators.steps import OK, status_of
-from mdstopo.scene.signal_segments import APART
+from mdstopo.scene.signal_segments import TIMES_APART
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 from mdstopo.status import Status
 
 #: arrays of a scene that a number may change so that `follow` differentiates by it
 BALANCE = frozenset({"mass", "force", "load_force", "load_arm", "v0", "schur_constant"})
 #: times closer than this, relative to the whole, are one
-TOGETHER = 2.0 * APART
+TOGETHER = 2.0 * TIMES_APART
 
 
 @dataclass(frozen=True)

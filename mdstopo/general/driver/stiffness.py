@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mdstopo.general.driver.general_driver import GeneralDriver
 
 #: steps of a motion that have to be held short, and their share, before implicit ones pay; steps that tell enough
-MANY, MOST, ENOUGH = 4000, 0.5, 8000
+MANY_STEPS, STIFF_SHARE, ENOUGH_STEPS = 4000, 0.5, 8000
 #: windows of collocation that have to be held short before explicit steps pay; windows that tell enough
 MANY_WINDOWS, ENOUGH_WINDOWS = 50, 500
 
@@ -29,20 +29,22 @@ def windows_held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
     finally:
         driver.allow(MAX_STEPS)
     held, windows = int(driver.work[HELD_SHORT]), int(driver.work[ACCEPTED])
-    if held < max(MOST * windows, MANY_WINDOWS):
+    if held < max(STIFF_SHARE * windows, MANY_WINDOWS):
         return ""
     return f"dampers hold {held} of {windows} windows of collocation short"
 
 
 def held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
     """That stability limits explicit steps with the design alpha (N,), in words; empty where it does not."""
-    driver.allow(ENOUGH)
+    driver.allow(ENOUGH_STEPS)
     try:
         code, _, _ = driver.run(alpha, False)
     finally:
         driver.allow(MAX_STEPS)
     held, steps = int(driver.work[HELD_SHORT]), int(driver.work[ACCEPTED])
-    hopeless = code == STEP_LIMIT and steps < ENOUGH  # held so short that the motion was given up before (`braking`)
-    if held < MOST * steps or not (hopeless or held >= MANY):
+    hopeless = (
+        code == STEP_LIMIT and steps < ENOUGH_STEPS
+    )  # held so short that the motion was given up before (`braking`)
+    if held < STIFF_SHARE * steps or not (hopeless or held >= MANY_STEPS):
         return ""
     return f"stability holds {held} of {steps} explicit steps short, not accuracy"

@@ -44,9 +44,9 @@ SCALE, MODE, SET = range(3)
 
 #: share of the square of a free length that rounding may take from the square of a length at home
 SURE = 1e-12
-#: of how many members with curves steps end at the knots: of groups of up to SMALL at any tolerance; of up to KNOTTED
-#: in all at tolerances down to COARSE, and of more below it by this power of the tolerance
-SMALL, KNOTTED, COARSE, RISE = 12, 40, 1e-6, 0.25
+#: of how many members with curves steps end at the knots: of groups of up to SMALL_GROUP at any tolerance; of up to
+#: KNOTTED in all at tolerances down to COARSE_TOLERANCE, and of more below it by this power of the tolerance
+SMALL_GROUP, KNOTTED, COARSE_TOLERANCE, RISE = 12, 40, 1e-6, 0.25
 
 
 @kernel
@@ -224,7 +224,7 @@ def knotted_at(tolerance):
 
     tolerance: of the case, relative.
     """
-    return np.int64(KNOTTED * max(COARSE / tolerance, 1.0) ** RISE)
+    return np.int64(KNOTTED * max(COARSE_TOLERANCE / tolerance, 1.0) ** RISE)
 
 
 @kernel
@@ -264,7 +264,7 @@ def set_modes(model, member_state, rel, rel_rate, most_knotted):
         r = rel[model.block[k, PAIR]]
         acc = rel_rate[model.block[k, PAIR]]
         lo = model.block[k, START]
-        small = most_knotted > 0 and model.block[k, COUNT] <= SMALL
+        small = most_knotted > 0 and model.block[k, COUNT] <= SMALL_GROUP
         for i in range(lo, lo + model.block[k, COUNT]):
             _, x, rate = member_motion(model, i, r)
             second = second_rate(model, i, r, acc)

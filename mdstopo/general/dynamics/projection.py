@@ -43,7 +43,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 #: misfit, relative to the scene, with which a joint counts as torn: its rows were taken for a repetition of others
 MISFIT = 1e-7
 #: corrections of the position at most; each squares the misfit
-MOST = 12
+MOST_CORRECTIONS = 12
 #: iterations of `solve_iteratively` at most, and the change of an iteration, relative and weighed by mass, at which
 #: they have settled
 ITERATIONS, SETTLED = 8, 1e-16
@@ -93,7 +93,7 @@ def project(model, scale, q, v, workspace, mu, nu):
     last = np.inf
     worst = np.inf
     moved = moved_most(model, q, scale)  # misfits are only known relative to it
-    for _ in range(MOST):
+    for _ in range(MOST_CORRECTIONS):
         turn_bodies(model, q, workspace.turned)
         joint_state(model, q, v, workspace)
         worst = misfit(model, workspace.phi, which)

@@ -23,13 +23,13 @@ from mdstopo.general.dynamics.joint_matrix import growth
 from mdstopo.general.model.switches import OF_JOINTS
 
 #: a step may not end where sigma is less than this share of what it was at its begin
-NEAR = 0.1
+LEAST_SIGMA_LEFT = 0.1
 #: share of the largest sigma so far below which a pose is looked out for, and below which steps have to cross it
-WATCH, CLOSE = 0.25, 0.02
+WATCHED_SIGMA, CROSSED_SIGMA = 0.25, 0.02
 #: a step that would end nearly there ends at this share of the way
 BEFORE = 0.6
 #: how far a step across a pose goes at least and, where it has to cross it, at most, as multiples of the way to it
-LEAST, FARTHEST = 1.5, 3.0
+SHORTEST_CROSSING, LONGEST_CROSSING = 1.5, 3.0
 #: lengths of a step that are tried
 TRIED = 32
 #: error of a step across a pose, relative to the motion and to sigma at its end, that cannot lead to another branch
@@ -52,7 +52,7 @@ def least_singular_value(model, workspace):
 def way_to_pose(h, before, now, largest):
     """The time until sigma vanishes, from its values `before` and `now` at a distance h; infinite where it may not
     vanish."""
-    if not now < before or now > WATCH * largest:
+    if not now < before or now > WATCHED_SIGMA * largest:
         return np.inf
     return h * now / (before - now)
 
@@ -66,10 +66,10 @@ def step_beside(h, way, must, nodes, s):
     if not must:
         if way > 2.0 * h:
             return h
-        if h < LEAST * way:
+        if h < SHORTEST_CROSSING * way:
             return min(h, BEFORE * way)
-    most = FARTHEST if must else h / way
-    least = LEAST if must else max(LEAST, 0.7 * most)
+    most = LONGEST_CROSSING if must else h / way
+    least = SHORTEST_CROSSING if must else max(SHORTEST_CROSSING, 0.7 * most)
     best = -1.0
     found = most
     for i in range(TRIED):
@@ -87,7 +87,7 @@ def step_beside(h, way, must, nodes, s):
 @kernel
 def crosses(h, way):
     """Whether a step of length h goes across the pose that is `way` ahead, as `step_beside` means it to."""
-    return h > 0.99 * LEAST * way
+    return h > 0.99 * SHORTEST_CROSSING * way
 
 
 @kernel

@@ -48,13 +48,13 @@ from mdstopo.mechanics.laws.law_table import (
 
 #: error of the cubic through both ends of a step, relative to the square of its length times the second derivative:
 #: (h omega)^2 / 384 of a vibration
-SLACK = 0.03
+CUBIC_ERROR = 0.03
 #: how near to the ends of a piece of a step it is not worth cutting
 EDGE = 1e-7
 #: how often a member may switch at one time by one of its margins
 AT_ONCE = 3
 #: a margin is watched unless the least control value of its cubic over a step is above this share of what it changes by
-FAR = 0.25
+UNWATCHED_MARGIN = 0.25
 
 
 @kernel
@@ -122,9 +122,9 @@ def watch_near(model, segment, t, member_state, rel0, rel1, h, watched):
     """Write into `watched` those members and contacts that may leave their mode within a step; the others are too
     far from its end.
 
-    The margin of a member is followed on the cubic by its values and rates at both ends, which stays above the least of
-    the cubic's four control values; FAR of what it changes by lies between that and zero. A margin that has rates in it
-    is always watched, and so are contacts.
+    The margin of a member is followed on the cubic through its values and rates at both ends, which stays above the
+    least of the cubic's four control values. A member is left out where that value is positive and more than
+    UNWATCHED_MARGIN of what the margin changes by. Margins with rates in them, and contacts, are always watched.
 
     Constant:
       model: the compiled scene.
@@ -148,7 +148,7 @@ def watch_near(model, segment, t, member_state, rel0, rel1, h, watched):
                 s0, d0, plain0 = margin_of_member(model, k, i, which, t, member_state, rel0[p], h)
                 s1, d1, plain1 = margin_of_member(model, k, i, which, t + h, member_state, rel1[p], h)
                 least = min(min(s0, s1), min(s0 + d0 / 3.0, s1 - d1 / 3.0))
-                if not (plain0 and plain1 and least > FAR * (abs(d0) + abs(d1) + abs(s1 - s0))):
+                if not (plain0 and plain1 and least > UNWATCHED_MARGIN * (abs(d0) + abs(d1) + abs(s1 - s0))):
                     found += 1
                     watched[found] = i
                     break
@@ -246,7 +246,7 @@ def first_dip(model, t, member_state, rel0, rel1, h, parts, watched):
             c, dip = lowest_between(s0, d0, s1, d1)
             if dip < 0.0:
                 best = min(best, c)
-            elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
+            elif dip < low and dip < CUBIC_ERROR * parts * parts * (d1 - d0):
                 low = dip
                 near = c
     return best, near, low

@@ -12,10 +12,10 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.events.events import first_sign, smallest_margin
 from mdstopo.general.events.locate import (
-    AIM,
-    BESIDE,
+    BEHIND_SWITCH,
     CUTS,
-    NEAR,
+    NEAR_SWITCH,
+    RATE_SHIFT,
     RESOLUTION,
     TRIALS,
     cut_at,
@@ -202,7 +202,7 @@ def root_inside(step, segment, t, h, low, high, at_high, rounding, resolution):
     for tries in range(TRIALS):
         apart = last - before
         slope = (at_last - at_before) / apart if apart != 0.0 else 0.0
-        foreseen = last - (at_last + AIM * rounding) / slope if slope < 0.0 and tries > 0 else -1.0
+        foreseen = last - (at_last + BEHIND_SWITCH * rounding) / slope if slope < 0.0 and tries > 0 else -1.0
         middle = next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries)
         if middle < 0.0:
             break
@@ -257,13 +257,13 @@ def on_joints(step, segment, t, h, low, c, value, who, rate, rounding, resolutio
     for tries in range(BOUNDED):
         if value < -rounding:
             high = c
-            if value >= -NEAR * rounding or not rate < 0.0 or high - low <= resolution:
+            if value >= -NEAR_SWITCH * rounding or not rate < 0.0 or high - low <= resolution:
                 return c, who, rate
         else:
             low = c
             if c >= 1.0:
                 break
-        shift = -(value + AIM * rounding) / (rate * h) if rate < 0.0 else 0.0
+        shift = -(value + BEHIND_SWITCH * rounding) / (rate * h) if rate < 0.0 else 0.0
         if abs(shift) < resolution:
             shift = resolution if value >= -rounding else -resolution
         c += shift
@@ -316,7 +316,7 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
             break
         c = earlier
         at_high = lower
-    beside = c - BESIDE * (c - begin)
+    beside = c - RATE_SHIFT * (c - begin)
     step.single[0] = 1  # its margin alone has a slope there: that of another may be the smallest before
     step.single[1] = who
     value, _ = margin_inside(step, segment, t, h, beside, step.single, no, step.at_q, step.at_v)

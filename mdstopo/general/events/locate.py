@@ -38,12 +38,12 @@ TRIALS, LAST_FORESEEN = 130, 15
 #: cuts of one step
 CUTS = 24
 #: margins (times rounding) at which a place behind the switch is near enough, and which is aimed at
-NEAR, AIM = 50.0, 5.0
+NEAR_SWITCH, BEHIND_SWITCH = 50.0, 5.0
 #: times that differ by less than this part of them are one: a step as short would have no length
 RESOLUTION = 4e-16
 #: trials that are foreseen; evaluations of the quintic's margin for its root, and how near that is found; by which
 #: share of the piece its rate is differenced
-FORESEEN, LAPS, CLOSE, BESIDE = 8, 40, 1e-9, 1e-4
+FORESEEN, LAPS, ROOT_FOUND, RATE_SHIFT = 8, 40, 1e-9, 1e-4
 #: steps beside a switch at which slopes begin with a root: relative to the time from it and to it; the shortest are the
 #: longest one so far times the tolerance to this power
 LEAVE, APPROACH, NEAREST = 1.0, 0.5, 0.65
@@ -123,13 +123,13 @@ def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, watc
         c = (a * at_b - b * at_a) / (at_b - at_a)
         if not a < c < b:
             c = 0.5 * (a + b)
-        if b - a <= CLOSE:
+        if b - a <= ROOT_FOUND:
             break
         value = foreseen_margin(
             model, member_state, segment, t, low, high, ends_q, ends, c, watched, room_q, room_v, rel
         )
         if value < 0.0:
-            if b - c <= CLOSE and side == 1:
+            if b - c <= ROOT_FOUND and side == 1:
                 break
             b = c
             at_b = value
@@ -137,7 +137,7 @@ def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, watc
                 at_a *= 0.5
             side = 1
         else:
-            if c - a <= CLOSE and side == -1:
+            if c - a <= ROOT_FOUND and side == -1:
                 break
             a = c
             at_a = value
@@ -174,16 +174,16 @@ def foreseen_trial(
     if tries >= FORESEEN:
         return -1.0
     last = trials[0, 0]
-    over = trials[0, 1] + AIM * rounding
+    over = trials[0, 1] + BEHIND_SWITCH * rounding
     if tries == 1:
-        c = min(max((last - low) / (high - low), BESIDE), 1.0 - BESIDE)
+        c = min(max((last - low) / (high - low), RATE_SHIFT), 1.0 - RATE_SHIFT)
         ahead = foreseen_margin(
-            model, member_state, segment, t, low, high, ends_q, ends, c + BESIDE, watched, room_q, room_v, rel
+            model, member_state, segment, t, low, high, ends_q, ends, c + RATE_SHIFT, watched, room_q, room_v, rel
         )
         behind = foreseen_margin(
-            model, member_state, segment, t, low, high, ends_q, ends, c - BESIDE, watched, room_q, room_v, rel
+            model, member_state, segment, t, low, high, ends_q, ends, c - RATE_SHIFT, watched, room_q, room_v, rel
         )
-        rate = (ahead - behind) / (2.0 * BESIDE * (high - low))
+        rate = (ahead - behind) / (2.0 * RATE_SHIFT * (high - low))
     else:
         apart = last - trials[1, 0]
         rate = (trials[0, 1] - trials[1, 1]) / apart if apart != 0.0 else 0.0
@@ -214,12 +214,12 @@ def next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries
     resolution: lengths that differ by no more than this are the same (s).
     tries: how many trials there have been.
     """
-    if high - low <= resolution or at_high >= -NEAR * rounding:
+    if high - low <= resolution or at_high >= -NEAR_SWITCH * rounding:
         return -1.0
     halve = tries > LAST_FORESEEN and tries % 2 == 0
     if low < foreseen < high and not halve:
         return foreseen
-    aim = AIM * rounding
+    aim = BEHIND_SWITCH * rounding
     middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
     if halve or middle <= low or middle >= high:
         middle = 0.5 * (low + high)

@@ -3,7 +3,13 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.dynamics.singular_poses import CLOSE, NEAR, crosses, error_along, least_singular_value
+from mdstopo.general.dynamics.singular_poses import (
+    CROSSED_SIGMA,
+    LEAST_SIGMA_LEFT,
+    crosses,
+    error_along,
+    least_singular_value,
+)
 from mdstopo.general.integrators.adaptive_run import count_rejected, reject
 from mdstopo.general.integrators.braking import friction_error
 from mdstopo.general.steps.first_step import motion_scale
@@ -46,7 +52,7 @@ def judge_step(tag, run):
     if error > run.rules.tolerance or turned > 1.1 * TURN:
         reject(run, s, run.wanted)
         return False, OK
-    if poses.at_end < NEAR * poses.sigma and not run.trial.lands and h > 1e-9 * run.rules.span:
+    if poses.at_end < LEAST_SIGMA_LEFT * poses.sigma and not run.trial.lands and h > 1e-9 * run.rules.span:
         run.wanted = 0.6 * h  # and it still reaches across the pose
         count_rejected(run, s)
         return False, OK
@@ -75,7 +81,7 @@ def _error(tag, run):
     motion_weights(model, run.rel, scales.scale, scales.weight)
     # near a singular pose errors of velocities do not count as if they lasted: joints determine velocities there, and
     # the step has to reach across the pose
-    lasting = run.longest if poses.sigma >= CLOSE * poses.largest else 0.0
+    lasting = run.longest if poses.sigma >= CROSSED_SIGMA * poses.largest else 0.0
     error = step_error(tag, weights, s, h, lasting, step.a, scales.weight)
     if crosses(h, poses.way):
         error = error_along(model, step.workspace, weights, s, h, step.a, scales.weight, error, poses.at_end)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.dynamics.singular_poses import CLOSE, step_beside
+from mdstopo.general.dynamics.singular_poses import CROSSED_SIGMA, step_beside
 from mdstopo.general.events.locate import step_beside_sharp, time_to_switch
 from mdstopo.general.integrators.braking import HELD, HOPELESS
 from mdstopo.integrators.steps import HELD_SHORT, OK, STABLE, STEP_LIMIT, STEP_TOO_SMALL
@@ -66,7 +66,7 @@ def _beside_pose(run, h):
     poses = run.poses
     if not poses.way < np.inf:
         return np.inf
-    must = poses.reaches and poses.sigma < CLOSE * poses.largest
+    must = poses.reaches and poses.sigma < CROSSED_SIGMA * poses.largest
     return step_beside(h, poses.way, must, run.step.table[2, 0], run.rules.s)
 
 

@@ -15,15 +15,16 @@ from mdstopo.general.model.bundles import bundle
 from mdstopo.general.steps.method_interface import is_explicit, scheme
 from mdstopo.general.steps.run_start import ROUNDING, method_number, scene_size
 from mdstopo.general.steps.step_trial import Trial
-from mdstopo.integrators.springs_runge_kutta import MOST
+from mdstopo.integrators.springs_runge_kutta import MOST_STAGES
 from mdstopo.integrators.steps import OF_REJECTED, REJECTED
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size
 
 #: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own.
-#: Above LOOSE the estimate is larger than the error by more and more (in long steps it is not the next term of a
-#: series), and MARGIN (tolerance / LOOSE)^SLACK is as safe: over 110 scenes with joints, all laws, motions and events
-#: errors are below ten tolerances in 98 to 99 of a hundred objectives and gradients, at every tolerance
-MARGIN, LOOSE, SLACK = 0.02, 1e-5, 1.0 / 3.0
+#: Above LOOSE_TOLERANCE the estimate is larger than the error by more and more (in long steps it is not the next term
+#: of a series), and ERROR_SHARE (tolerance / LOOSE_TOLERANCE)^LOOSE_POWER is as safe: over 110 scenes with joints, all
+#: laws, motions and events errors are below ten tolerances in 98 to 99 of a hundred objectives and gradients, at every
+#: tolerance
+ERROR_SHARE, LOOSE_TOLERANCE, LOOSE_POWER = 0.02, 1e-5, 1.0 / 3.0
 
 #: the parts of the structures below
 RULES = (
@@ -139,7 +140,7 @@ def make_run(tag, model, tables, tangent, settings, limits, history, member_stat
     pose = (model.pair.shape[0], pose_size(model))
     step = landing_of(
         model, tables[method_number(model)], scene_size(model), member_state, model.q0.copy(), model.v0.copy(),
-        np.zeros((MOST, n_q)), np.zeros((MOST, n)), np.zeros((MOST, n)), make_workspace(model),
+        np.zeros((MOST_STAGES, n_q)), np.zeros((MOST_STAGES, n)), np.zeros((MOST_STAGES, n)), make_workspace(model),
         room_for_watched(model),
     )  # fmt: skip
     none = np.int64(0)
@@ -188,7 +189,7 @@ def _rules(tag, model, tangent, settings, limits, size):
     s, order, _ = scheme(tag, method_number(model))
     explicit = is_explicit(tag)
     return Rules(
-        MARGIN * settings[0] * max(settings[0] / LOOSE, 1.0) ** SLACK,
+        ERROR_SHARE * settings[0] * max(settings[0] / LOOSE_TOLERANCE, 1.0) ** LOOSE_POWER,
         settings[2],
         limits[0],
         settings[4] != 0.0,

@@ -8,7 +8,7 @@ from mdstopo.general.dynamics.singular_poses import least_singular_value
 from mdstopo.general.events.event_log import log_switches, note_switch
 from mdstopo.general.events.events import is_doubtful, smallest_margin, watch_near
 from mdstopo.general.events.landing import CORRECTIONS, first_event
-from mdstopo.general.events.locate import AIM, NEAR, RESOLUTION, is_sharp, time_to_sharp
+from mdstopo.general.events.locate import BEHIND_SWITCH, NEAR_SWITCH, RESOLUTION, is_sharp, time_to_sharp
 from mdstopo.general.integrators.adaptive_run import reject
 from mdstopo.general.integrators.runge_kutta_step import advance_trial
 from mdstopo.general.steps.method_interface import is_explicit, make_stages
@@ -145,14 +145,14 @@ def _advance_to_switch(tag, run, c, rate):
             return True
         relative_pose(step.model, run.end_q, run.end_v, step.rel)
         value, _ = smallest_margin(step.model, run.t + trial.h, step.member_state, step.rel, step.watched)
-        near = value < -rounding and (value >= -NEAR * rounding or tries >= CORRECTIONS // 2)
+        near = value < -rounding and (value >= -NEAR_SWITCH * rounding or tries >= CORRECTIONS // 2)
         if near or tries + 1 == CORRECTIONS:
             break
         if tries > 0 and trial.h != before and (value - at_before) / (trial.h - before) < 0.0:
             rate = (value - at_before) / (trial.h - before)
         before = trial.h
         at_before = value
-        shift = -(value + AIM * rounding) / rate if rate < 0.0 else resolution * 4.0**tries
+        shift = -(value + BEHIND_SWITCH * rounding) / rate if rate < 0.0 else resolution * 4.0**tries
         trial.h = min(max(trial.h + shift, 0.5 * trial.h, resolution), h)
     trial.happens = value < -rounding
     return False

@@ -43,7 +43,7 @@ TAG = (0, 0, 0, 0)
 #: Newton's iterations of a stage at most; the correction, relative to how far bodies move in the step, at which it
 #: ends; and the one from which on a correction that is no smaller than HALF the last is rounding, as is one that is
 #: below ROUNDING of the scene's size: where bodies have come to rest they move by less than rounding in a step
-MOST, CLOSELY, ROUNDED, HALF = 12, 1e-13, 1e-7, 0.5
+MOST_ITERATIONS, CLOSELY, ROUNDED, HALF = 12, 1e-13, 1e-7, 0.5
 #: error of a step of the length tau, relative to the motion (`first_step`)
 FIRST_ERROR = 0.05
 
@@ -133,7 +133,7 @@ def find_stage(model, table, i, member_state, segment, t, h, q0, workspace, lam,
         v[d] += w_v * now[d]
     shift_further(model, q0, shift, shift, q)
     before = np.inf
-    for _ in range(MOST):
+    for _ in range(MOST_ITERATIONS):
         singular = solve_accelerations(model, member_state, segment, t, q, v, np.bool_(True), workspace, off, lam)
         work[FORCES] += 1
         work[TANGENTS] += 1

@@ -18,7 +18,7 @@ from mdstopo.general.dynamics.accelerations import make_workspace
 from mdstopo.general.dynamics.members import MODE, SET, may_meet, meeting, scale_general, shortest_at_start
 from mdstopo.general.integrators.gauss_window import (
     COUNTS,
-    MOST,
+    MOST_NODES,
     balance_nodes,
     is_coupled,
     keep_nodes,
@@ -35,7 +35,7 @@ from mdstopo.general.steps.run_start import motion_at_start
 from mdstopo.general.steps.step_history import EVENTS, FIRST, carve_history, copy_vector, keep_state, keep_step
 from mdstopo.integrators.driver import LOOSE_NEWTON, NEWTON_TOLERANCE
 from mdstopo.integrators.rows import integrate_to_nodes, take_rows
-from mdstopo.integrators.springs_gauss import FIRST_LEVEL, LONGEST, caution
+from mdstopo.integrators.springs_gauss import FIRST_LEVEL, FIRST_WINDOW_SPAN, caution
 from mdstopo.integrators.steps import (
     ACCEPTED,
     HELD_SHORT,
@@ -66,7 +66,7 @@ TAG = (0, 0, 0)
 #: error of a window relative to the tolerance, where more is looked at than energies: rates and accelerations are worse
 #: off. Measured on two bodies with all smooth laws and a bushing, nineteen responses and their gradients, tolerances
 #: from 1e-3 to 1e-10: errors are up to 5.4 times the one of a window
-MARGIN = 0.3
+WINDOW_ERROR = 0.3
 #: planes of `gauss_tables`
 _A, _AA, _LEGENDRE, _FIRST, _SECOND, _VALUES = 1, 2, 3, 4, 5, 6
 #: every which node of a window is looked at for members whose ends meet
@@ -82,8 +82,8 @@ def margin_of(model):
     count = model.response.shape[0]
     for j in range(count):
         if model.response[j, KIND] != ENERGY:
-            return MARGIN
-    return 1.0 if count > 0 else MARGIN
+            return WINDOW_ERROR
+    return 1.0 if count > 0 else WINDOW_ERROR
 
 
 @kernel
@@ -282,11 +282,11 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     times = model.times
     t = times[0]
     drive_state(model, np.int64(0), t, q0, v0)
-    for i in range(MOST):
+    for i in range(MOST_NODES):
         copy_vector(q0, nodes.q[i])  # those of ground stay
     relative_pose(model, q0, v0, rel0)
     relative_pose(model, q0, v0, before)
-    if history.when.shape[0] < MOST:
+    if history.when.shape[0] < MOST_NODES:
         return NEEDS_ROOM, 0, t
     begin_nodes(model, v0, nodes)
     nodes.when[0] = t
@@ -305,7 +305,9 @@ def windows(model, tables, member_state, settings, most, history, work, where):
     span = last_time - t
     wanted = fixed_step
     if not fixed_step > 0.0:
-        wanted = min(span, LONGEST / max(rate_of(model, workspace), 1e-300), TURN / max(widest_turn(model, v0), 1e-300))
+        wanted = min(
+            span, FIRST_WINDOW_SPAN / max(rate_of(model, workspace), 1e-300), TURN / max(widest_turn(model, v0), 1e-300)
+        )
     keep_state(history, 0, t, q0, v0, push[0], push[1])
     history.index[0, FIRST] = 0
     count = np.int64(0)
@@ -316,7 +318,7 @@ def windows(model, tables, member_state, settings, most, history, work, where):
         while t < stop:
             if count >= most:
                 return STEP_LIMIT, count, t
-            if count + 4 > history.t.shape[0] or stages + MOST > history.when.shape[0]:
+            if count + 4 > history.t.shape[0] or stages + MOST_NODES > history.when.shape[0]:
                 return NEEDS_ROOM, count, t
             pieces = np.ceil((stop - t) / wanted - 1e-9)
             h = (stop - t) / max(pieces, 1.0)

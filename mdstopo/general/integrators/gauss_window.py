@@ -59,7 +59,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 from mdstopo.mechanics.kinematics.vectors import minus, put, times, vector_at
 
 COUNTS = LEVELS
-MOST = max(LEVELS)
+MOST_NODES = max(LEVELS)
 #: freedoms of moving bodies up to which slopes are multiplied as dense matrices
 DENSE = 24
 
@@ -110,10 +110,10 @@ def make_nodes(model):
     n_pair = model.pair.shape[0]
     m = moving(model)
     size = m if m <= DENSE else 0
-    rows = make_rows(10 * MOST + 3 + 2 * (MOST + 1) * size, m)
+    rows = make_rows(10 * MOST_NODES + 3 + 2 * (MOST_NODES + 1) * size, m)
     of_node = model.q0.shape[0] + 2 * n + n_pair * (pose_size(model) + sums_size(model))
     of_node += model.home.shape[0] * window_size(model) + 1
-    return _carve_nodes(model, rows, np.zeros(MOST * of_node + 6 * n + model.size[0] + n_pair))
+    return _carve_nodes(model, rows, np.zeros(MOST_NODES * of_node + 6 * n + model.size[0] + n_pair))
 
 
 @kernel
@@ -123,7 +123,7 @@ def _carve_nodes(model, rows, room):
     It is a function of its own because of compile time: no references are counted of arrays that are cut out of ones
     that are given. Where these are made, counting them would be most of the code.
 
-    model: the compiled scene. rows (10 MOST + 3 + 2 (MOST + 1) M, W), room: zeros.
+    model: the compiled scene. rows (10 MOST_NODES + 3 + 2 (MOST_NODES + 1) M, W), room: zeros.
     """
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
@@ -131,35 +131,35 @@ def _carve_nodes(model, rows, room):
     width = row_width(m)
     size = m if m <= DENSE else 0
     # where in `rows` the next part begins
-    vectors = 10 * MOST
+    vectors = 10 * MOST_NODES
     by_x = vectors + 3
-    by_y = by_x + MOST * size
-    by_q = by_y + MOST * size
+    by_y = by_x + MOST_NODES * size
+    by_q = by_y + MOST_NODES * size
     by_v = by_q + size
     # where in `room` each part ends
-    q = MOST * model.q0.shape[0]
-    v = q + MOST * n
-    a = v + MOST * n
-    rel = a + MOST * n_pair * pose_size(model)
-    maps = rel + MOST * model.home.shape[0] * window_size(model)
+    q = MOST_NODES * model.q0.shape[0]
+    v = q + MOST_NODES * n
+    a = v + MOST_NODES * n
+    rel = a + MOST_NODES * n_pair * pose_size(model)
+    maps = rel + MOST_NODES * model.home.shape[0] * window_size(model)
     change = maps + 5 * n
     row = change + model.size[0]
     inverse = row + n
     reached = inverse + n_pair
-    when = reached + MOST
-    each = rows[:vectors].reshape((10, MOST, width))
+    when = reached + MOST_NODES
+    each = rows[:vectors].reshape((10, MOST_NODES, width))
     for d in range(m):
         room[row + d] = 1.0 / model.mass[d]
     return Nodes(
         each[0], each[1], each[2], each[3], each[4], each[5], each[6], each[7], each[8], each[9], rows[vectors],
-        rows[vectors + 1], rows[vectors + 2], rows[by_x:by_y].reshape((MOST, size, width)),
-        rows[by_y:by_q].reshape((MOST, size, width)), room[:q].reshape((MOST, model.q0.shape[0])),
-        room[q:v].reshape((MOST, n)), room[v:a].reshape((MOST, n)),
-        room[a:rel].reshape((MOST, n_pair, pose_size(model))),
-        room[rel:maps].reshape((MOST, model.home.shape[0], window_size(model))), rows[by_q:by_v], rows[by_v:],
+        rows[vectors + 1], rows[vectors + 2], rows[by_x:by_y].reshape((MOST_NODES, size, width)),
+        rows[by_y:by_q].reshape((MOST_NODES, size, width)), room[:q].reshape((MOST_NODES, model.q0.shape[0])),
+        room[q:v].reshape((MOST_NODES, n)), room[v:a].reshape((MOST_NODES, n)),
+        room[a:rel].reshape((MOST_NODES, n_pair, pose_size(model))),
+        room[rel:maps].reshape((MOST_NODES, model.home.shape[0], window_size(model))), rows[by_q:by_v], rows[by_v:],
         room[maps:change].reshape((5, n)), room[change:row], room[row:inverse], room[inverse:reached],
         room[reached:when],
-        room[when:].reshape((MOST, n_pair, sums_size(model))),  # those of pairs without members stay zero
+        room[when:].reshape((MOST_NODES, n_pair, sums_size(model))),  # those of pairs without members stay zero
     )  # fmt: skip
 
 

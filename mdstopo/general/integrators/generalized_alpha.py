@@ -34,7 +34,7 @@ from mdstopo.general.steps.step_history import (
     keep_state,
     keep_step,
 )
-from mdstopo.integrators.springs_generalized_alpha import FEWEST
+from mdstopo.integrators.springs_generalized_alpha import FEWEST_STEPS
 from mdstopo.integrators.steps import (
     ACCEPTED,
     CHATTERING,
@@ -112,7 +112,7 @@ def _begin(run):
     motion_at_start(model, run.member_state, run.workspace, run.rel0, v, stiffness, run.extent[0], run.extent[1])
     shortest_at_start(model, run.rel0, run.shortest)
     if not rules.step > 0.0:
-        longest = (model.times[model.times.shape[0] - 1] - pace.t) / FEWEST
+        longest = (model.times[model.times.shape[0] - 1] - pace.t) / FEWEST_STEPS
         rate = rate_of(model, run.workspace)
         rules.step = min(-rules.step / rate, longest) if rate > 0.0 else longest
     if rules.switching:

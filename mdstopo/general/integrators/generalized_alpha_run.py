@@ -152,7 +152,7 @@ def make_step(run, segment, t, h, starting, o, state, end_q, ends, push):
     """One step of a run: `generalized_alpha_step.advance`, which returns what this does.
 
     run: a `FixedRun`.
-    segment, t, h, starting, o, state, end_q, ends, push: as of it.
+    segment, t, h, starting, o, state, end_q, ends, push: as of `advance`.
     """
     return advance(
         run.model, run.rules.radius, run.member_state, segment, t, h, starting, run.q, state, run.guess,

@@ -10,7 +10,7 @@ from mdstopo.general.dynamics.projection import project
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.steps.step_history import copy_vector, keep_energy, keep_stage
 from mdstopo.integrators.springs_gauss_equations import CLOSELY
-from mdstopo.integrators.springs_generalized_alpha import MOST, RESOLVED, RESTART, weights_of
+from mdstopo.integrators.springs_generalized_alpha import MOST_CORRECTIONS, RESOLVED, RESTART, weights_of
 from mdstopo.integrators.steps import FORCES, NEWTON, NEWTON_FAILED, NON_FINITE, OK, SINGULAR, TANGENTS
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     advance_coordinates,
@@ -229,7 +229,7 @@ def advance(
         if e <= newton_tolerance or (e >= 0.5 * previous and e < rounding):
             break
         previous = e
-        if newton >= MOST or (newton >= RESTART and not e < np.inf):
+        if newton >= MOST_CORRECTIONS or (newton >= RESTART and not e < np.inf):
             return (NEWTON_FAILED if e < np.inf else NON_FINITE), stages, -1
         newton = RESTART if not e < np.inf else newton + 1
     drive_state(model, segment, t + h, q, v)

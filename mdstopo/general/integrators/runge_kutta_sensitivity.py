@@ -12,7 +12,7 @@ from mdstopo.general.steps.run_start import method_number, scene_size
 from mdstopo.general.steps.step_history import EVENTS, FIRST, PARENT, SEGMENT, keep_state, restore_modes
 from mdstopo.general.steps.step_inside import table_of_step
 from mdstopo.general.steps.step_linear import changes_forward, steps_back
-from mdstopo.integrators.springs_runge_kutta import MOST
+from mdstopo.integrators.springs_runge_kutta import MOST_STAGES
 from mdstopo.integrators.steps import OF_POINTS
 from mdstopo.mechanics.kinematics.kinematics_interface import advance_coordinates
 
@@ -33,8 +33,9 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
     restore_modes(history, history.index[k, EVENTS], member_state)
     advance(
         tag, model, tables[method], s, member_state, history.index[k, SEGMENT], history.t[k], h, history.q[k],
-        history.v[k], keep, o if keep else np.int64(-1), workspace, np.empty(model.size[0]), np.empty((MOST, n_q)),
-        np.empty((MOST, n)), np.empty((MOST, n)), history, q, v, push, scene_size(model), work,
+        history.v[k], keep, o if keep else np.int64(-1), workspace, np.empty(model.size[0]),
+        np.empty((MOST_STAGES, n_q)), np.empty((MOST_STAGES, n)), np.empty((MOST_STAGES, n)), history, q, v,
+        push, scene_size(model), work,
     )  # fmt: skip
     work[OF_POINTS] += s
     if not keep:

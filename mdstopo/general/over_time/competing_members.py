@@ -10,7 +10,7 @@ import numpy as np
 from mdstopo.case.methods.over_time import ReductionKind
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import MEMBER_FORCE, SUBJECT
-from mdstopo.general.peaks.peak_search import ALIKE, EVEN, MARGIN
+from mdstopo.general.peaks.peak_search import MEAN_ALIKE, RATES_ALIKE, RISE_MARGIN
 from mdstopo.general.responses.extremes import FRACTIONS, row_of
 from mdstopo.general.responses.general_responses import members_of
 from mdstopo.scene.springs_model import FloatArray, IndexArray
@@ -21,7 +21,7 @@ FOLLOWED = 12
 #: second pass, with those alone that come near the largest
 AT_ONCE = 2**21
 #: error of the samples of a force, relative: they lie on the steps' quintic
-BESIDE = 0.02
+SAMPLE_ERROR = 0.02
 #: peaks are at most so many times the largest sample of a force
 BETWEEN = 2.0
 
@@ -119,8 +119,8 @@ def _inside(
     # as `peak_search.has_no_peak`
     uneven = np.abs(b - a - 0.5 * h * (da + db))
     least = np.minimum(np.abs(da), np.abs(db))
-    low = MARGIN * (h * (np.abs(da) + np.abs(db)) + uneven) < limit - np.maximum(a, b)
-    even = (da * db > 0.0) & (np.abs(db - da) <= ALIKE * least) & (uneven <= EVEN * h * least)
+    low = RISE_MARGIN * (h * (np.abs(da) + np.abs(db)) + uneven) < limit - np.maximum(a, b)
+    even = (da * db > 0.0) & (np.abs(db - da) <= RATES_ALIKE * least) & (uneven <= MEAN_ALIKE * h * least)
     plain = np.all(low | even, axis=0).astype(np.int64)
     steps, inner = np.flatnonzero(plain == 0), np.array(FRACTIONS[1:-1])
     found = np.full((len(who), len(h), len(FRACTIONS), 2), np.nan)
@@ -139,7 +139,7 @@ def _limit(top: FloatArray, least: float, most: int) -> float:
     """
     if len(top) >= most:
         least = max(least, float(np.partition(top, -most)[-most]))
-    return (1.0 - BESIDE) * least
+    return (1.0 - SAMPLE_ERROR) * least
 
 
 def compare(

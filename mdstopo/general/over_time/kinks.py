@@ -1,18 +1,19 @@
-"""Integrals over time of what has kinks: a norm that passes zero, the largest of several forces that changes hands.
+"""Integrals over time of what has kinks: a norm that passes zero, the largest force where it passes to
+another member.
 
 A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
 first sampled, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
 derivatives bend more sharply than values; for values see `quadrature_breakpoints`). The integrand is continuous at a
 kink, so its time adds no term to the derivative of the integral. Beside a norm's zero the derivative is along a vector
 that all but vanishes, and the last stages of a long step have an error that would turn this vector anywhere. Steps
-beside a zero are therefore short (`BESIDE`).
+beside a zero are therefore short (`STEP_BESIDE_ZERO`).
 """
 
 import numpy as np
 
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import GeneralModel
-from mdstopo.general.over_time.minima import LOW
+from mdstopo.general.over_time.minima import LOW_MINIMUM
 from mdstopo.general.over_time.pieces import Pieces
 from mdstopo.general.responses.extremes import FRACTION, STEP, TIME, VALUE, EvaluateAt
 from mdstopo.general.responses.general_responses import has_kinks, has_norm, is_expression
@@ -23,7 +24,7 @@ from mdstopo.scene.springs_model import FloatArray
 ALL = 1e9
 #: how long the steps beside a norm's zero are, relative to the step that it was found in: the last stage of a step is
 #: off by its length to the sixth power or so
-BESIDE = 0.1
+STEP_BESIDE_ZERO = 0.1
 #: fractions of a step at which values beside a kink are compared, one after the other
 DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
 
@@ -58,7 +59,7 @@ def _kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
     rate = float(np.abs(rates).max())
     for row in pieces.minima(ALL):
         low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
-        if low > LOW * highest or not t[0] < row[TIME] < t[-1]:
+        if low > LOW_MINIMUM * highest or not t[0] < row[TIME] < t[-1]:
             continue
         w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.evaluate_at)
         if min(w + c, len(pieces.t) - 1 - w - c) <= DISTANCES[-1]:  # zero from the start, or to the end: no kink
@@ -67,7 +68,7 @@ def _kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
         found.append(time)
         around = _around(time, low, rate, float(t[0]), float(t[-1]))
         if not around and turns_round(driver.scene.model, j):
-            beside = BESIDE * float(pieces.t[w + 1] - pieces.t[w])
+            beside = STEP_BESIDE_ZERO * float(pieces.t[w + 1] - pieces.t[w])
             around = [each for each in (time - beside, time + beside) if t[0] < each < t[-1]]
         found += around
     return found

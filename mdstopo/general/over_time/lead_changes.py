@@ -1,4 +1,5 @@
-"""When two members of a group change hands: the places in steps at which their forces are equal, or equal and opposite.
+"""When the largest force of a group passes from one member to another: the places in steps at which the forces of two
+members are equal, or equal and opposite.
 
 All pairs of a batch of steps are looked for together, on arrays: what takes long is the way from Python to the kernel
 that computes forces, and one call serves any number of places. The cubics through samples say first which pairs may
@@ -15,12 +16,12 @@ from mdstopo.general.responses.general_responses import TIE
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: a member whose cubic stays below the largest force by less than this share of it may lead in truth
-CLOSE = 1e-3
-#: how far a cubic between two samples may be off beside, relative to the largest rate there, per interval
+MAY_LEAD = 1e-3
+#: what is added to it: how far a cubic between two samples may be off, relative to the largest rate there, per interval
 OFF = 1e-4
 #: members that are compared between two samples at most, those with the largest forces; of more that come near the
 #: largest force there at once, changes between the others are not looked for
-MOST = 24
+MOST_COMPARED = 24
 #: pairs that are looked at in one go, each at all samples of a step
 AT_ONCE = 100_000
 #: places between two samples at which cubics are compared, and how far any other place is from the nearest at most
@@ -29,7 +30,7 @@ APART = 0.5 * float(PLACES[1])
 #: looks at a dip of a difference that may pass zero
 TRIALS = 4
 #: Newton's steps at most, and the share of a step below which one ends them: the next one would be its square
-NEWTON, ENOUGH = 80, 1e-12
+NEWTON, LAST_CORRECTION = 80, 1e-12
 #: bisections of a cubic: it only says where Newton's method begins
 BISECTIONS = 20
 
@@ -110,7 +111,7 @@ class CompetingMembers(NamedTuple):
 def lead_changes(
     force: FloatArray, rate: FloatArray, may: NDArray[np.bool_], fine: FloatArray, exact: Exact
 ) -> tuple[IndexArray, FloatArray]:
-    """Where members may change hands: number of the step (R,), fraction of it (R,), in order of time.
+    """Where the lead may pass to another member: number of the step (R,), fraction of it (R,), in order of time.
 
     force (C, W, K): forces of members at samples of steps (N). rate (C, W, K): their rates, per interval (N).
     may (C, W, K - 1): which members may lead between two samples.
@@ -129,8 +130,10 @@ def lead_changes(
 def _changes_in(
     competing: CompetingMembers, force: FloatArray, fine: FloatArray, exact: Exact
 ) -> tuple[IndexArray, FloatArray]:
-    """Where competing members change hands: number of the step (R,), fraction of it (R,); further arguments as of
-    `lead_changes`."""
+    """Where the lead passes between competing members: number of the step (R,), fraction of it (R,).
+
+    Further arguments: as of `lead_changes`.
+    """
     pairs = _pairs(competing, force)
     a, b = (competing.curves.some(rows, pairs.cell) for rows in pairs.rows)
     difference = Cubics(*(x - pairs.sign * y for x, y in zip(a, b, strict=True)))
@@ -162,7 +165,7 @@ def _changes_in(
 def _competing(force: FloatArray, rate: FloatArray, may: NDArray[np.bool_]) -> CompetingMembers:
     """Where which members come so near the largest force, by their cubics, that they may lead.
 
-    Of more than MOST members those with the largest forces. Arguments as of `lead_changes`.
+    Of more than MOST_COMPARED members those with the largest forces. Arguments as of `lead_changes`.
     """
     step, interval, member = np.nonzero(np.moveaxis(may, 0, -1))
     new = np.append(True, (np.diff(step) != 0) | (np.diff(interval) != 0))[: len(step)]
@@ -176,10 +179,10 @@ def _competing(force: FloatArray, rate: FloatArray, may: NDArray[np.bool_]) -> C
     for x in PLACES.tolist():
         size = np.abs(curves.at(x))
         largest = np.maximum.reduceat(size, first) if len(first) else size
-        near |= size >= (largest - 2.0 * (CLOSE * largest + APART * steepest))[cell]
+        near |= size >= (largest - 2.0 * (MAY_LEAD * largest + APART * steepest))[cell]
     order = np.flatnonzero(near)
     order = order[np.lexsort([-np.abs(values[:, order]).max(axis=0), cell[order]])]
-    order = np.sort(order[_ranks(cell[order]) < MOST])
+    order = np.sort(order[_ranks(cell[order]) < MOST_COMPARED])
     contested, own = np.unique(cell[order], return_inverse=True)
     several = np.bincount(own, minlength=len(contested)) > 1
     order, contested = order[several[own]], contested[several]
@@ -253,13 +256,13 @@ def _leads(competing: CompetingMembers, pairs: Pairs, guess: FloatArray) -> NDAr
     # cubics of forces that are nearly the same meet anywhere: not only where the guess is
     for x in PLACES.tolist():
         largest = np.abs(competing.curves.at(x)).max(axis=0, initial=0.0)[pairs.cell]
-        slack = 2.0 * (CLOSE * largest + OFF * steepest)
+        slack = 2.0 * (MAY_LEAD * largest + OFF * steepest)
         own, other = a.at(x), b.at(x)
         near |= (np.abs(own - pairs.sign * other) <= slack) & (np.abs(own) >= largest - slack)
     largest = np.zeros(len(guess))
     for row in range(len(competing.members)):
         largest = np.maximum(largest, np.abs(competing.curves.some(row, pairs.cell).at(guess)))
-    slack = 2.0 * (CLOSE * largest + OFF * steepest)
+    slack = 2.0 * (MAY_LEAD * largest + OFF * steepest)
     found: NDArray[np.bool_] = near | (np.abs(a.at(guess)) >= largest - slack)
     return found
 
@@ -309,7 +312,7 @@ class _Search:
             bad |= np.abs(step) > 0.5 * before[live]
             step = np.where(bad & (value != 0.0), 0.5 * (low[live] + high[live]) - x, step)
             found[live], before[live] = x + step, np.abs(step)
-            live = live[(value != 0.0) & (np.abs(step) > ENOUGH) & (high[live] - low[live] > ENOUGH)]
+            live = live[(value != 0.0) & (np.abs(step) > LAST_CORRECTION) & (high[live] - low[live] > LAST_CORRECTION)]
         return found
 
     def zeros_of_dips(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mdstopo.general.driver_interface import DriverWithRun
 from mdstopo.general.model.general_model import KIND, MEMBER_FORCE
 from mdstopo.general.over_time.competing_members import compare, members_behind
-from mdstopo.general.over_time.lead_changes import CLOSE, lead_changes
+from mdstopo.general.over_time.lead_changes import MAY_LEAD, lead_changes
 from mdstopo.general.over_time.piece import Piece, add_piece, distinct_cuts
 from mdstopo.general.responses.extremes import FRACTIONS
 from mdstopo.general.responses.general_responses import TIE
@@ -120,7 +120,7 @@ def _may_lead(force: FloatArray, rate: FloatArray) -> NDArray[np.bool_]:
     highest = np.maximum(size[..., :-1], size[..., 1:]) + bend
     turns = force[..., :-1] * force[..., 1:] <= 0.0
     lowest = np.where(turns, 0.0, np.minimum(size[..., :-1], size[..., 1:]) - bend)
-    found: NDArray[np.bool_] = highest >= (1.0 - CLOSE) * np.maximum(lowest.max(axis=0), 0.0)
+    found: NDArray[np.bool_] = highest >= (1.0 - MAY_LEAD) * np.maximum(lowest.max(axis=0), 0.0)
     return found
 
 
@@ -137,7 +137,7 @@ def _different(force: FloatArray) -> IndexArray:
 
 
 def _changes(group: _Group, steps: IndexArray, who: IndexArray, may: NDArray[np.bool_]) -> Iterator[tuple[int, float]]:
-    """Steps and fractions of them at which members may change hands, in order of time.
+    """Steps and fractions of them at which the lead may pass to another member, in order of time.
 
     steps (W,): in which several members may lead. who (C,): members. may (C, W): which of them may lead in which step.
     """

@@ -1,7 +1,7 @@
 """Minima over time of what has kinks: the largest of several forces, an absolute value, a norm.
 
-The minimum of the largest force may stand where two members change hands: there f_a falls and f_b rises, both have the
-value, and so does the minimum of a design nearby, where the time t of the crossing is another one:
+The minimum of the largest force may stand where it passes from one member to another: there f_a falls and f_b rises,
+both have the value, and so does the minimum of a design nearby, where the time t of the crossing is another one:
 
     dG = df_a + f_a' dt = df_b + f_b' dt,   so   dG = (f_b' df_a - f_a' df_b) / (f_b' - f_a'),
 
@@ -20,11 +20,11 @@ from mdstopo.integrators.driver import CLOSENESS
 from mdstopo.scene.springs_model import FloatArray
 
 #: a minimum below this share of the highest value may be a zero, or nearly one
-LOW = 0.05
+LOW_MINIMUM = 0.05
 #: distances, in steps, of the places whose squares tell where a value turns round
-APART = (1e-2, 1e-3)
+BESIDE_MINIMUM = (1e-2, 1e-3)
 #: a minimum is a zero if, at the rate beside it, the value would reach zero within this share of a step
-NOUGHT = 1e-9
+ZERO_WITHIN = 1e-9
 #: how near to zero a value is that has a kink where a step was made to end at its zero, relative to the highest
 LANDED = 1e-6
 
@@ -42,7 +42,7 @@ def minima(driver: DriverWithRun, j: int, t: FloatArray) -> FloatArray:
         if c <= 0.0 or c >= 1.0:
             if 0 < between < len(pieces):
                 _at_boundary(row, pieces, between, highest, pieces.is_stated(between))
-        elif bent and abs(row[VALUE]) <= LOW * highest:
+        elif bent and abs(row[VALUE]) <= LOW_MINIMUM * highest:
             _turned_round(row, pieces, k)
     return rows
 
@@ -68,7 +68,7 @@ def _turned_round(row: FloatArray, pieces: Pieces, k: int) -> None:
     """Complete a row inside piece k whose value is low: where exactly its square is lowest, and whether it is zero."""
     c = float(row[FRACTION])
     least = slope = 0.0
-    for d in APART:
+    for d in BESIDE_MINIMUM:
         nodes = min(max(c - 2.0 * d, 0.0), 1.0 - 4.0 * d) + d * np.arange(5.0)
         u = (nodes - c) / d
         by_power = np.linalg.solve(np.vander(u, increasing=True), pieces.value(k, nodes) ** 2)
@@ -81,7 +81,7 @@ def _turned_round(row: FloatArray, pieces: Pieces, k: int) -> None:
             x = float(np.clip(x - rate(x) / bend(x), u[0], u[-1]))
         c += d * x
         least, slope = float(square(x)), 0.5 * float(bend(x)) / d**2
-    if least <= NOUGHT**2 * slope:
+    if least <= ZERO_WITHIN**2 * slope:
         row[VALUE], row[OTHER] = 0.0, ZERO
     else:
         row[VALUE] = pieces.value(k, np.array([c]))[0]

@@ -22,9 +22,9 @@ from mdstopo.scene.signal_segments import segment_values, signals_of
 from mdstopo.scene.springs_model import FloatArray
 
 #: below this share of what it may be a response is rounding
-NOUGHT = 1e-12
+ROUNDING_SHARE = 1e-12
 #: elongations are at least so large, relative to the scene: they are differences of coordinates, whose rounding is this
-#: share of NOUGHT
+#: share of ROUNDING_SHARE
 LEAST_ELONGATION = 1e-3
 #: by the unit of a number of a law: which size it makes a force of
 MAKES_FORCE = {"N/m": "elongation", "N s/m": "m/s", "kg": "m/s^2"}
@@ -63,7 +63,7 @@ def motion_sizes(driver: DriverWithRun, count: int) -> dict[str, float]:
         "N m": force * size,
         "elongation": elongation,
         # a rounding of elongations stores a square of it
-        "J": NOUGHT * (stored + force * size),
+        "J": ROUNDING_SHARE * (stored + force * size),
     }
 
 
@@ -75,9 +75,9 @@ def rounding_of(driver: DriverWithRun, j: int, sizes: Mapping[str, float]) -> fl
     response = driver.scene.responses[j]
     kind = kind_of(response)
     if not kind.of_members:
-        return NOUGHT * sizes.get(kind.unit, 0.0)
+        return ROUNDING_SHARE * sizes.get(kind.unit, 0.0)
     group = [each.name for each in driver.case.members].index(response.group or "")
-    return NOUGHT * _of_members(driver, group, {unit: sizes[by] for unit, by in MAKES_FORCE.items()})
+    return ROUNDING_SHARE * _of_members(driver, group, {unit: sizes[by] for unit, by in MAKES_FORCE.items()})
 
 
 def _of_members(driver: DriverWithRun, group: int, sizes: Mapping[str, float]) -> float:

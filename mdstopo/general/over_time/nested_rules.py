@@ -20,7 +20,7 @@ from mdstopo.scene.springs_model import FloatArray
 DEGREE, MORE = 12, 16
 #: sum of the magnitudes of its weights at most, which is what rounding of values is multiplied by; how far its nodes
 #: are apart at least
-LARGEST, APART = 4.0, 1e-3
+LARGEST_SUM, NODES_APART = 4.0, 1e-3
 #: how exactly polynomials are to be integrated
 EXACT = 1e-12
 #: nodes of the rule of Gauss's that is taken where there is none of no more nodes
@@ -47,10 +47,10 @@ def nested_rules(nodes: tuple[float, ...], weights: tuple[float, ...]) -> Nested
         if degree < DEGREE or _error(given, own, degree - 4) < EXACT:
             continue
         places = np.concatenate([given, _added(given, count)])
-        if not (np.all((places >= 0.0) & (places <= 1.0)) and np.diff(np.sort(places)).min() > APART):
+        if not (np.all((places >= 0.0) & (places <= 1.0)) and np.diff(np.sort(places)).min() > NODES_APART):
             continue
         better = _interpolatory(places)
-        if np.abs(better).sum() <= LARGEST and _error(places, better, degree) < EXACT:
+        if np.abs(better).sum() <= LARGEST_SUM and _error(places, better, degree) < EXACT:
             return NestedRules(places, np.append(own, np.zeros(count)), better)
     x, better = legendre.leggauss(GAUSS)
     places = np.concatenate([given, 0.5 * (x + 1.0)])

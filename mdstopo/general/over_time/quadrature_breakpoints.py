@@ -24,15 +24,15 @@ from mdstopo.general.steps.run_start import method_number
 from mdstopo.general.steps.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
-from mdstopo.scene.signal_segments import APART
+from mdstopo.scene.signal_segments import TIMES_APART
 from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: how often an evaluation looks for breakpoints
-ROUNDS = 3
+MOST_LOOKS = 3
 #: how far both sums over a step may differ, relative to the tolerance and the whole integral: derivatives bend more
 #: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
 #: tolerances). It costs little, because one halving more lowers the difference by hundreds
-SHARE = 1e-3
+SUMS_DIFFER = 1e-3
 #: halvings of one step at most; after PATIENCE of them a part that is shorter than the motion by RESOLVED is given up
 #: where one more leaves a larger share of the difference than VAIN: what is left is rounding. In a longer one it may be
 #: an integrand that oscillates within it, as one of a load that the motion does not feel
@@ -44,10 +44,10 @@ FADES = 0.25
 #: truth: joints hold it there, which states keep to and what is between them misses
 MISSED, MOSTLY = 1e-3, 0.75
 #: how many steps are looked at before all are, and in which share of them it has to be so
-FEW, OFTEN = 32, 0.5
+FIRST_LOOKED_AT, SHARE_OF_LOOKED_AT = 32, 0.5
 #: at how many places inside a step values are looked at, at least, and in all steps of a run together; where in its
 #: part of a step each is, beside the middle, where much is symmetric
-INSIDE, IN_RUN, BESIDE = 3, 64, 0.4
+INSIDE, IN_RUN, OFF_MIDDLE = 3, 64, 0.4
 
 #: places (K, 2), and between which two ends each is (K,) -> values (K, R)
 Integrands = Callable[[FloatArray, IndexArray], FloatArray]
@@ -81,10 +81,10 @@ def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Mapping[
     if not driver.method.kind.adaptive or driver.settings[2] > 0.0:
         return found
     ends = np.unique(np.concatenate([t, found, driver.quadrature_breakpoints]))
-    ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]
+    ends = ends[np.concatenate([[True], np.diff(ends) > TIMES_APART * (t[-1] - t[0])])]
     integrands = _integrands(driver, integrals, t, ends)
     nothing = np.array([followed[j] ** 2 if square else followed[j] for j, square in integrals])
-    tolerance = SHARE * float(driver.settings[0])
+    tolerance = SUMS_DIFFER * float(driver.settings[0])
     return found + halves(t, ends, integrands, _rules(driver, count), tolerance, nothing)
 
 
@@ -97,8 +97,10 @@ def _held_at_zero(driver: DriverWithRun, count: int, nothing: Mapping[int, float
     model = driver.scene.model
     asked = [j for j, size in nothing.items() if size > 0.0 or has_kinks(model, j)]
     steps = np.arange(count)
-    if count > FEW:  # what is not often zero in some steps is not mostly zero in all
-        asked = _seem_held(driver, count, {j: nothing[j] for j in asked}, steps[:: -(-count // FEW)], OFTEN)
+    if count > FIRST_LOOKED_AT:  # what is not often zero in some steps is not mostly zero in all
+        asked = _seem_held(
+            driver, count, {j: nothing[j] for j in asked}, steps[:: -(-count // FIRST_LOOKED_AT)], SHARE_OF_LOOKED_AT
+        )
     return set(_seem_held(driver, count, {j: nothing[j] for j in asked}, steps, MOSTLY))
 
 
@@ -126,7 +128,7 @@ def _seem_held(
     if not np.any(is_rounding | kinked):
         return []
     places = max(INSIDE, -(-IN_RUN // count))
-    inside = ((np.arange(places) + BESIDE) / places).tolist()
+    inside = ((np.arange(places) + OFF_MIDDLE) / places).tolist()
     between = np.max([sizes(fraction) for fraction in inside], axis=0)
     seem = is_rounding | (kinked & _are_missed(ends, between, share))
     if not np.any(seem):
@@ -215,7 +217,7 @@ def halves(
             either = np.maximum(whole, np.abs(sums).sum(axis=0))  # either may miss a pulse
             asked = np.tile(either > nothing * span, (len(low), 1))
         off = np.abs(sums - better)
-        bad = asked & (off > allowed * whole) & (width > 2.0 * APART * span)[:, None]
+        bad = asked & (off > allowed * whole) & (width > 2.0 * TIMES_APART * span)[:, None]
         if depth >= PATIENCE:  # what does not fall with its halves is rounding
             pair = off.reshape(2, -1, len(whole)).sum(axis=0)
             bad &= np.tile(pair <= VAIN * before, (2, 1)) | (width * RESOLVED > span)[:, None]

@@ -18,7 +18,7 @@ from mdstopo.general.responses.general_responses import switches_of
 from mdstopo.scene.springs_model import FloatArray
 
 #: a jump that is smaller than this, relative to the values beside it, is none
-SAME = 1e-9
+NO_JUMP = 1e-9
 
 
 def switched_peaks(
@@ -61,7 +61,7 @@ def switched_integral(
     for b in changes:
         before, behind = (float(seen[0]) for seen in pieces.one_sided_limits(b))
         drop = before * before - behind * behind if square else before - behind
-        if abs(drop) <= SAME * largest * (largest if square else 1.0):
+        if abs(drop) <= NO_JUMP * largest * (largest if square else 1.0):
             continue
         speed, margin = _passed(driver, j, pieces, b)
         if margin:

@@ -11,7 +11,7 @@ from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import ENERGY, KIND, ORDER, SUBJECT, unpack_general
 from mdstopo.general.model.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.responses.general_responses import (
-    APART,
+    RATE_SHIFT,
     chosen_part,
     follows_state,
     group_forces,
@@ -373,7 +373,7 @@ def compare(
             seen[m, i, 1] = 0.0
         if who.shape[0] == 0:
             continue
-        apart = APART * (history.t[k + 1] - history.t[k])
+        apart = RATE_SHIFT * (history.t[k + 1] - history.t[k])
         work[FORCES] += 2
         work[OF_SAMPLES] += 2
         for side in (-1.0, 1.0):

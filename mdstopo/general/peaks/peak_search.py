@@ -59,12 +59,12 @@ JUMP = 1e-9
 TRIALS = 60
 #: in place of 1 where samples are left out at the ends of a step, too; stages of a step that say so, at least; and what
 #: they may be off by beside what they differ by, relative to the largest value
-LOW, MANY, APART = 2, 12, 0.02
+LOW, MANY_STAGES, SAMPLES_OFF = 2, 12, 0.02
 #: a change of the fraction at which a peak has settled: secants square it, or nearly
-SETTLED = 1e-8
+PEAK_SETTLED = 1e-8
 #: a step has no peak inside if its ends stay below the limit by so many times what it may rise by; or if it rises (or
 #: falls) at both ends, with rates that differ by at most one share, and a mean rate that is theirs to another
-MARGIN, ALIKE, EVEN = 4.0, 0.5, 0.1
+RISE_MARGIN, RATES_ALIKE, MEAN_ALIKE = 4.0, 0.5, 0.1
 
 
 @kernel
@@ -189,10 +189,10 @@ def has_no_peak(h, left, right, sign, limit):
     a, b = sign * left[G], sign * right[G]
     da, db = sign * left[DG], sign * right[DG]
     uneven = abs(b - a - 0.5 * h * (da + db))
-    if MARGIN * (h * (abs(da) + abs(db)) + uneven) < limit - max(a, b):
+    if RISE_MARGIN * (h * (abs(da) + abs(db)) + uneven) < limit - max(a, b):
         return True
     least = min(abs(da), abs(db))
-    return da * db > 0.0 and abs(db - da) <= ALIKE * least and uneven <= EVEN * h * least
+    return da * db > 0.0 and abs(db - da) <= RATES_ALIKE * least and uneven <= MEAN_ALIKE * h * least
 
 
 @kernel
@@ -220,7 +220,7 @@ def mark_low(motion, j, both, closeness, plain):
         stop = history.index[k + 1, FIRST]
         most[k] = -np.inf
         least[k] = np.inf
-        if stop - o < MANY:
+        if stop - o < MANY_STAGES:
             return
         restore_modes(history, history.index[k, EVENTS], motion.member_state)
         for at in range(o, stop):
@@ -238,7 +238,7 @@ def mark_low(motion, j, both, closeness, plain):
         bottom = min(bottom, least[k])
     size = max(abs(top), abs(bottom))
     for k in range(motion.count):
-        change = most[k] - least[k] + APART * size
+        change = most[k] - least[k] + SAMPLES_OFF * size
         up = most[k] + change < top - closeness * abs(top)
         down = not both or -least[k] + change < -bottom - closeness * abs(bottom)
         plain[k] = LOW if up and down else 0
@@ -362,7 +362,7 @@ def refine(tag, motion, j, who, pieces, w, low, high, rise, fall, sign, first, b
         evaluate_piece(tag, motion, j, who, pieces, w, c, sample)
         rate = sign * sample[DG]
         # the next secant would lead no farther than the square of this one
-        if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= SETTLED:
+        if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= PEAK_SETTLED:
             break
         if c != last and not np.isnan(last):
             bend = (rate - at_last) / (c - last)

@@ -84,7 +84,7 @@ LINED_FIRST = 2**LINED_LEVEL - 1
 LINED_PARTS = 2**LEVELS - 2**LINED_LEVEL
 LINED_AT_ONCE = 2 ** (LEVELS - 1)
 #: bounds are so much wider, relative to lengths and speeds, than they need be: no member is at a switch by rounding
-WIDER = 1e-11
+BOUNDS_WIDER = 1e-11
 #: what may be known of the modes of all members of a part in a step: nothing; a mode of which none leaves (0 and more);
 #: or that all leave it (-2 less its number), between the same two nodes and for the same one
 UNSURE = -1
@@ -429,7 +429,7 @@ def fill_series(axes, frame, at_row, line, rows, number, w, series):
     first *= inverse
     rate *= inverse
     bulge = number[BULGE]
-    off = 2.0 * bulge + WIDER * (1.0 + length)
+    off = 2.0 * bulge + BOUNDS_WIDER * (1.0 + length)
     series[X] = length - number[FREE]
     series[X_S] = second - number[FREE_S]
     series[X_Q] = -first - number[FREE_Q]
@@ -443,7 +443,7 @@ def fill_series(axes, frame, at_row, line, rows, number, w, series):
     series[V_S] = (swing + second_rate - second * rate) * inverse
     series[V_Q] = (first * rate - first_rate) * inverse
     off = 0.6 * near * near * speed + near * turning * reach + bulge * (speed * inverse + turning)
-    series[V_OFF] = off + WIDER * (1.0 + speed)
+    series[V_OFF] = off + BOUNDS_WIDER * (1.0 + speed)
     return True
 
 

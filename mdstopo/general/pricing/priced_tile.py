@@ -88,7 +88,7 @@ def make_lists(candidates):
 def begin_pricing(model, candidates, k, place, scratch, lists, price):
     """A `PricedTile` with no step listed and no member in a mode.
 
-    model, candidates, k, scratch, price: as of it.
+    model, candidates, k, scratch, price: as of `PricedTile`.
     place: its grids, i, j and error.
     lists: a `StepLists`, which is emptied.
     """

@@ -10,7 +10,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, larger, load, negative, zero
-from mdstopo.general.design.followed_member import CLOSE
+from mdstopo.general.design.followed_member import CLOSE_MARGIN
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODES
 from mdstopo.general.pricing.certain_modes import (
     FASTEST,
@@ -198,7 +198,7 @@ def _fill_below(tangent, series, below):
         for m in range(0 if known else NODES):
             x = series[m]
             value = own[AT_ZERO] + by_x * x[X] + by_rate * x[V] - abs(by_x) * x[X_OFF] - abs(by_rate) * x[V_OFF]
-            below[count, BY_1] = value - (CLOSE if m == 0 else SURE)
+            below[count, BY_1] = value - (CLOSE_MARGIN if m == 0 else SURE)
             below[count, BY_S] = by_x * x[X_S] + by_rate * x[V_S]
             below[count, BY_Q] = by_x * x[X_Q] + by_rate * x[V_Q]
             below[count, BY_SS] = by_x * x[X_SS]

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import WIDE, lanes, larger, load, negative, zero
-from mdstopo.general.design.followed_member import CLOSE, NODE_ROWS
+from mdstopo.general.design.followed_member import CLOSE_MARGIN, NODE_ROWS
 from mdstopo.general.model.bundles import bundle
 from mdstopo.general.model.general_model import MEMBER_FREE_LENGTH
 from mdstopo.general.model.priced_candidates import CODE, FIRST_NODE, NODE, NODES
@@ -42,7 +42,7 @@ FROM, TO, COUNT = range(CLASS_NUMBERS)
 #: the class of members that are in none
 UNSORTED = -1
 #: members that are sorted at once
-MANY = SHORT * TALL
+SORTED_AT_ONCE = SHORT * TALL
 #: modes in which members may stay that are tried, at most
 TRIED = 4
 #: corners of the range of elongations and rates of all members
@@ -64,9 +64,9 @@ class Sorting:
     kind (PLACES,): the class of each member. row_class (TALL,): the class that all members of a row are in, or UNSORTED
     where they may differ; UNSORTED outside `followed_by_few.follow_parts`, as `sorted_prices._list_places` relies on.
     classes (CLASSES, CLASS_NUMBERS): what is known of each. places (PLACES,): places of some members. mode (NODES,): of
-    all members of a part at the nodes of a step. works (NODES, WORKS, MANY): what members do there. unsorted: 1 for
-    each of the narrowest parts that is not sorted. tried (TRIED,), tangent: modes in which members may stay, and the
-    tangents of their margins.
+    all members of a part at the nodes of a step. works (NODES, WORKS, SORTED_AT_ONCE): what members do there. unsorted:
+    1 for each of the narrowest parts that is not sorted. tried (TRIED,), tangent: modes in which members may stay, and
+    the tangents of their margins.
     """
 
     def __init__(self, *_arrays: Any) -> None: ...
@@ -84,7 +84,7 @@ def make_sorting():
         np.zeros((CLASSES, CLASS_NUMBERS), np.int64),
         np.zeros(PLACES, np.int64),
         np.zeros(NODES, np.int64),
-        np.zeros((NODES, WORKS, MANY)),
+        np.zeros((NODES, WORKS, SORTED_AT_ONCE)),
         np.zeros(BROAD // NARROW, np.int64),
         np.zeros(TRIED, np.int64),
         np.zeros((TRIED, CORNERS, TANGENT_NUMBERS)),
@@ -235,8 +235,8 @@ def sort_places(model, candidates, k, s, places, count, modes, known, begin, kep
     outside = np.zeros((TRIED, NODES), np.int64)
     node = np.empty((NODE_ROWS, NODES))
     mode[:] = UNSURE
-    for at in range(0, count, MANY):
-        wide = min(MANY, count - at)
+    for at in range(0, count, SORTED_AT_ONCE):
+        wide = min(SORTED_AT_ONCE, count - at)
         take_members(model, places[at : at + wide], wide, (wide + WIDE - 1) // WIDE * WIDE)
         for m in range(NODES):
             o = candidates.step[s, FIRST_NODE] + m
@@ -286,7 +286,7 @@ def _fill_masks(modes, i, sorting, inside, outside):
         rate = load(works[m, RATE], i)
         for n in range(modes):
             margin = least_margin(tangent[n], x, rate)
-            inside[n, m] = ~negative(margin - (CLOSE if m == 0 else SURE))
+            inside[n, m] = ~negative(margin - (CLOSE_MARGIN if m == 0 else SURE))
             outside[n, m] = negative(margin + SURE)
 
 
@@ -430,7 +430,7 @@ def stay_in(n, i, begin, sorting):
             continue
         x = load(works[m, ELONGATION], i)
         rate = load(works[m, RATE], i)
-        bits &= ~negative(least_margin(own, x, rate) - (CLOSE if m == 0 else SURE))
+        bits &= ~negative(least_margin(own, x, rate) - (CLOSE_MARGIN if m == 0 else SURE))
     return bits
 
 
@@ -443,7 +443,8 @@ def modes_of(code, p, curves, rest, time, old, mode, works, i, sure):
     time (2,): start and length of the step (s).
     old: the mode with which it begins, or UNSURE where it is to be found.
     mode (NODES,): of all members at the nodes, or UNSURE.
-    works (NODES, WORKS, MANY), i: what members do at the nodes where that is so, less their sets, and which one it is.
+    works (NODES, WORKS, SORTED_AT_ONCE), i: what members do at the nodes where that is so, less their sets, and which
+      one it is.
     sure: margins at nodes that are nearer to zero than this do not tell (m, m/s or a part).
     """
     unsure = np.int64(UNSURE)
@@ -453,7 +454,7 @@ def modes_of(code, p, curves, rest, time, old, mode, works, i, sure):
         x = works[0, ELONGATION, i]
         rate = works[0, RATE, i]
         old = np.int64(law_start(code, p, x, rate, 0.0, time[0], curves, rest))
-        is_clear = law_margin(code, p, x, rate, old, time[0], curves, rest) > CLOSE
+        is_clear = law_margin(code, p, x, rate, old, time[0], curves, rest) > CLOSE_MARGIN
         if not is_clear or law_first_set(code, p, x, old) != 0.0:
             return unsure, unsure
     now = old

@@ -14,7 +14,7 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes, larger, largest, load, store, where_larger, zero
 from mdstopo.general.design.followed_member import (
     CHANGES,
-    CLOSE,
+    CLOSE_MARGIN,
     NODE_ROWS,
     PIECE,
     PIECE_MODE,
@@ -398,7 +398,7 @@ def mode_at_start(model, candidates, k, i, s, node):
     t = candidates.step_time[s, 0]
     rest = model.member[MEMBER_FREE_LENGTH, i]
     mode = np.int64(law_start(code, p, x, rate, 0.0, t, model.curves, rest))
-    if not law_margin(code, p, x, rate, mode, t, model.curves, rest) > CLOSE:
+    if not law_margin(code, p, x, rate, mode, t, model.curves, rest) > CLOSE_MARGIN:
         mode = _by_second_derivative(model, candidates, k, i, s, node)
     return mode
 

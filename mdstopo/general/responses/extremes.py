@@ -15,7 +15,7 @@ from mdstopo.general.model.expressions import MARGINS
 from mdstopo.scene.springs_model import FloatArray
 
 #: columns of a row: time, value, step, fraction of it, rate on this side, sign of what is largest, member; and where
-#: two members change hands there (`minima`), the other one and its share of the derivative
+#: the lead passes to another member there (`minima`), that one and its share of the derivative
 TIME, VALUE, STEP, FRACTION, RATE, SIGN, WHO, OTHER, SHARE = range(9)
 COLUMNS = 9
 #: in column OTHER in place of a member: there is none; the value is a zero, and stays one for designs nearby. One from

@@ -101,7 +101,7 @@ LISTED: Listed[ResponseKernels] = Listed()
 #: them does to derivatives
 TIE = 1e-9
 #: fraction of a step by which the rate of a response is differenced where it has no formula
-APART = 3e-4
+RATE_SHIFT = 3e-4
 
 
 def _chosen_of_bodies(pick: Callable[[ResponseKernels], Any]) -> Callable[[F], F]:
@@ -999,7 +999,7 @@ def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, 
     if size == 0.0:
         return 0.0
     here = a.copy()
-    apart = APART * (history.t[k + 1] - history.t[k])
+    apart = RATE_SHIFT * (history.t[k + 1] - history.t[k])
     for side in range(2):
         e = apart if side == 1 else -apart
         state_at_offset(tag, model, history, k, c, e, q, v, here, near_q, near[0])
@@ -1161,7 +1161,7 @@ def rated(
             p = _expression_numbers(model, member_state, segment, j, t, q, v, a, lam, workspace)
             rate += formula_value(model, j, who, p, t, np.empty(model.response[j, PARTS]))[1]
         return value, rate, made
-    apart = APART * (history.t[k + 1] - history.t[k])
+    apart = RATE_SHIFT * (history.t[k + 1] - history.t[k])
     sides = np.zeros(2)
     for side in range(2):
         e = apart if side == 1 else -apart

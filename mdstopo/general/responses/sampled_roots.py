@@ -11,10 +11,10 @@ from mdstopo.scene.springs_model import FloatArray
 TRIALS = 4
 #: where between two samples a function is compared with the cubic of their values and rates; by what share of the
 #: largest value there it may differ; how often what differs more is halved
-PLACES, SHARE, HALVINGS = (0.29, 0.5, 0.73), 0.02, 8
+PLACES, CUBIC_OFF, HALVINGS = (0.29, 0.5, 0.73), 0.02, 8
 #: shares of an interval: over which a rate is a difference, and from which on behind a root at its start others are
 #: looked for
-APART, BEHIND = 1e-4, 1e-6
+RATE_SHIFT, BEHIND_ROOT = 1e-4, 1e-6
 
 
 def may_vanish(values: FloatArray, rates: FloatArray) -> NDArray[np.bool_]:
@@ -90,7 +90,7 @@ def roots_on_grid(
     for k in np.flatnonzero(values == 0.0).tolist():
         yield float(times[k])
         if k + 1 < len(times):  # its sign behind is that of its rate: another root in the interval would be hidden
-            times[k] += BEHIND * (times[k + 1] - times[k])
+            times[k] += BEHIND_ROOT * (times[k + 1] - times[k])
             values[k] = exact(times[k : k + 1])[0]
     widths = np.diff(times)
     for k in np.flatnonzero(may_vanish(values, rates)).tolist():
@@ -116,14 +116,14 @@ def _resolved(
             cubic = f0 + c * (r0 + c * (3.0 * (f1 - f0) - 2.0 * r0 - r1 + c * (r0 + r1 - 2.0 * (f1 - f0))))
             seen = exact(start + c * width)
             largest, off = np.maximum(largest, np.abs(seen)), np.maximum(off, np.abs(seen - cubic))
-        split = open_[off > SHARE * largest]
+        split = open_[off > CUBIC_OFF * largest]
         if not len(split):
             break
         width = times[split + 1] - times[split]
         middle = times[split] + 0.5 * width
-        ahead, back = exact(middle + APART * width), exact(middle - APART * width)
+        ahead, back = exact(middle + RATE_SHIFT * width), exact(middle - RATE_SHIFT * width)
         times, values = np.insert(times, split + 1, middle), np.insert(values, split + 1, exact(middle))
-        rates = np.insert(rates, split + 1, (ahead - back) / (2.0 * APART * width))
+        rates = np.insert(rates, split + 1, (ahead - back) / (2.0 * RATE_SHIFT * width))
         first = split + np.arange(len(split))
         open_ = np.sort(np.concatenate([first, first + 1]))
     return times.copy(), values.copy(), rates

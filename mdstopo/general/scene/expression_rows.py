@@ -1,6 +1,6 @@
 """Expressions of responses as rows of `GeneralModel.response`, with their data among those of laws."""
 
-from mdstopo.case.objects.aims import Response
+from mdstopo.case.objects.problem_parts import Response
 from mdstopo.case.responses.expression_response import program_of
 from mdstopo.case.responses.response_kinds import kind_of
 from mdstopo.compiler.formulas import address_of

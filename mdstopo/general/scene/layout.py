@@ -19,7 +19,7 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 #: a row of which no larger share than this is independent of the others is implied by them
 INDEPENDENT = 1e-9
 #: unknowns up to which their natural order is good enough
-FEW = 30
+FEW_UNKNOWNS = 30
 
 
 class Layout(NamedTuple):
@@ -90,7 +90,7 @@ def arrange(
                 columns.append([d for d in coordinates if free[d]])
     place, half = _order(len(free), free, pair, columns, each)
     meet = _meetings(joint, free, each)
-    order, envelope, entries = _order_rows(row, meet, len(columns), many=len(place) > FEW)
+    order, envelope, entries = _order_rows(row, meet, len(columns), many=len(place) > FEW_UNKNOWNS)
     line = np.zeros((len(columns), 4), dtype=np.int64)
 
     def slopes_at(j: int, r: int) -> int:
@@ -150,7 +150,7 @@ def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]],
         links.update((i, j) for i in own for j in own)
     for r, coordinates in enumerate(columns):
         links.update((n + r, d) for d in coordinates)
-    place = _reordered(links, total) if total > FEW else np.arange(total, dtype=np.int64)
+    place = _reordered(links, total) if total > FEW_UNKNOWNS else np.arange(total, dtype=np.int64)
     driven = np.concatenate([free == 0, np.zeros(len(columns), dtype=bool)])
     place[np.lexsort((place, driven))] = np.arange(total)
     return place, _width(links, place)

@@ -26,7 +26,7 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 #: the arrays of a scene that may follow from names, besides places of members and numbers of laws
 BALANCE = ("mass", "v0", "force", "load_body", "load_follows", "load_arm", "load_force", "schur_constant")
 #: how far names are shifted, relative to their size, and how large they are at least, as a share of their range
-SHIFT, LEAST = 1e-4, 3e-3
+SHIFT, LEAST_SIZE = 1e-4, 3e-3
 #: arrays that are seen from the principal axes of bodies. Those of an inertia that is scaled as a whole stay, but for
 #: rounding, relative to the largest number
 TURNED = ("home", "member", "joint_par", "response_par", "contact", "bushing")
@@ -46,7 +46,7 @@ class NumbersOfScene:
         self._there = CasesWith(case, self._numbers, BESIDE_SCENE)
         #: how many names there are
         self.count = len(case.follows.names)
-        self._least = [LEAST * (each.upper - each.lower) for each in case.defined_variables]
+        self._least = [LEAST_SIZE * (each.upper - each.lower) for each in case.defined_variables]
         self._twins: list[tuple[GeneralModel, GeneralModel]] = []
         self._apart = np.zeros(0)
 

@@ -25,7 +25,7 @@ PROJECTIONS, AGAIN = 20, 2
 #: and relative to the scene, where there is hardly any way
 NEAREST, NONE_LEFT = 1e-7, 1e-13
 #: steps along the joints at most, how often one is shortened, how far it goes at most relative to the scene or in rad
-STEPS, SHORTER, FAR = 1000, 30, 0.1
+MOST_STEPS, MOST_SHORTENINGS, LONGEST_STEP = 1000, 30, 0.1
 #: how much of the pull along a step may point back at its end, and how much longer the next one may be
 BACK, LONGER = 0.1, 4.0
 
@@ -92,15 +92,15 @@ def _approach(model, scale, stated, stated_v, q, v, workspace, push):
     v_there = np.empty(n)
     way = _pull(model, workspace, stated, q, pull, push[0])
     length = 1.0
-    for _ in range(STEPS):
+    for _ in range(MOST_STEPS):
         size = _by_mass(model, pull, pull)
         largest = 0.0
         for d in range(n):  # no array expression: Numba names it by an address, which differs from process to process
             largest = max(largest, abs(pull[d]))
         if not size > NEAREST**2 * way or largest <= NONE_LEFT * min(moved_most(model, q, scale), scale):
             return
-        length = min(length, FAR * min(scale, 1.0) / largest)
-        for _ in range(SHORTER):
+        length = min(length, LONGEST_STEP * min(scale, 1.0) / largest)
+        for _ in range(MOST_SHORTENINGS):
             for d in range(n):
                 step[d] = length * pull[d]
             retract(model, q, step, there)

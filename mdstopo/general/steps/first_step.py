@@ -33,7 +33,7 @@ from mdstopo.mechanics.laws.law_table import law_is_given, law_unstretched
 
 #: balances at most; the theta that is small enough to tell tau, the one that is aimed at, and the one from which on it
 #: tells nothing: it cannot be larger than 3, as the motion's size has the change of the accelerations in it
-PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
+MOST_BALANCES, SMALL_THETA, AIMED_THETA, USELESS_THETA = 6, 0.5, 0.1, 2.0
 #: what the size of a motion counts as at most (m). A step that is far too long may end at 1e200 m, whose square is no
 #: number: relative to an infinite size every error would be zero, and the step would be kept
 LARGEST_MOTION = 1e150
@@ -148,7 +148,7 @@ def first_step(
     weight = np.empty(n)
     more = np.empty(n)
     h = end - t
-    for _ in range(PROBES):
+    for _ in range(MOST_BALANCES):
         advance_coordinates(model, q0, v0, a0, h, q)
         for d in range(n):
             v[d] = v0[d] + h * a0[d]
@@ -171,10 +171,10 @@ def first_step(
         theta = 0.0
         for d in range(n):
             theta = max(theta, 0.5 * h * h * weight[d] * abs(a[d] - a0[d]))
-        if theta <= ENOUGH:
+        if theta <= SMALL_THETA:
             tau = h / np.sqrt(max(theta, 1e-30))
             turned = largest_turn(model, q0, q, h, v0, v) / h
             allowed = tau * (tolerance / first_error) ** (1.0 / order)
             return min(allowed, TURN / max(turned, 1e-300))
-        h *= max(np.sqrt(AIM / theta), 0.1) if theta < HOPELESS else 0.1
+        h *= max(np.sqrt(AIMED_THETA / theta), 0.1) if theta < USELESS_THETA else 0.1
     return end - t  # no length was short enough to tell tau

@@ -719,7 +719,7 @@ def add_loads(model, segment, t, q, v, f):
 def load_tangent(model, segment, t, q, v, turn):
     """Slopes of what `add_loads` adds.
 
-    model, segment, t, q, v: as of it.
+    model, segment, t, q, v: as of `add_loads`.
     turn (n, `load_slopes`): out, by the turn of the body that a freedom belongs to, then by its turning rate.
     """
     raise NotImplementedError

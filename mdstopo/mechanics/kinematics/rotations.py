@@ -15,7 +15,7 @@ from mdstopo.compiler.jit import part
 from mdstopo.mechanics.kinematics.vectors import cross, dot, minus, plus, times
 
 #: squared angle below which what loses digits in closed form is summed as a series
-SMALL = 0.1
+SMALL_SQUARED_ANGLE = 0.1
 
 
 @part
@@ -82,7 +82,7 @@ def turn_between(before, after):
 @part
 def _weights(square):
     """(1 - cos)/|t|^2 and (1 - sin/|t|)/|t|^2 of a squared angle, and their derivatives by it."""
-    if square < SMALL:
+    if square < SMALL_SQUARED_ANGLE:
         first = 0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0)))
         first += square * square * square * square * (1.0 / 3628800.0 - square / 479001600.0)
         second = 1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0)))
@@ -132,7 +132,7 @@ def turn_rate_vjp(t, u, bar):
 @part
 def _beta(square):
     """beta of the module's docstring, and its derivative by |t|^2."""
-    if square < SMALL:
+    if square < SMALL_SQUARED_ANGLE:
         value = 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square * (1.0 / 1209600.0)))
         rest = square * square * square
         value += rest * square * (1.0 / 47900160.0 + square * 691.0 / 1307674368000.0)

@@ -33,7 +33,7 @@ from mdstopo.mechanics.kinematics.spatial_poses import ATTITUDE, COORDINATES, FR
 
 #: w^2 + s^2 of a turn about an axis across the one that headings are about is taken to be at least this; at half such a
 #: turn, where it is 0, there is no heading
-LEAST = 1e-12
+LEAST_HEADING = 1e-12
 
 
 @part
@@ -174,7 +174,7 @@ class SpatialKinematics(Kinematics):
         turn = (now * before.inv()).as_quat(canonical=True)
         x, w = turn[:, :3], turn[:, 3:]
         s = np.sum(x * u, axis=1, keepdims=True)
-        slope = (w * w * u + w * np.cross(x, u) + s * x) / np.maximum(w * w + s * s, LEAST)
+        slope = (w * w * u + w * np.cross(x, u) + s * x) / np.maximum(w * w + s * s, LEAST_HEADING)
         return Headings(2.0 * np.arctan2(s, w)[:, 0], now.inv().apply(u), now.inv().apply(slope))
 
 

@@ -50,7 +50,7 @@ def _turned_by(e, a):
 
 @part
 def _turn_of_angles(model, segment, t, i):
-    """Q, omega, omega' of roll, pitch and yaw, driven coordinates i and those behind it."""
+    """Q, omega, omega' of roll, pitch and yaw: the driven coordinates i, i + 1 and i + 2."""
     roll = driven_coordinate(model, segment, t, i)
     pitch = driven_coordinate(model, segment, t, i + 1)
     yaw = driven_coordinate(model, segment, t, i + 2)

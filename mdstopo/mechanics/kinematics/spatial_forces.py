@@ -212,7 +212,7 @@ def loads_vjp(model, segment, t, q, v, z, bar_q, bar_v):
 def _pull_load_back(model, body, follows, arm, push, moment, rows, z, bar_q):
     """The transpose of `_add_slopes`.
 
-    model, body, follows, arm, push, moment, rows: as of it.
+    model, body, follows, arm, push, moment, rows: as of `_add_slopes`.
     z (n,): cotangents of what the load adds.
     bar_q (n,): in and out.
     """

@@ -61,7 +61,7 @@ SEEN = 7
 #: the place of the threads that may share a pass in `GeneralModel.size`
 THREADS = 6
 #: members times poses from which on threads are worth making
-WORTH = 200_000
+WORTH_THREADS = 200_000
 
 
 @part
@@ -98,7 +98,7 @@ def grid_sums(member, width, scale, start, count, length, p, rel, pair, poses, c
     parts = np.zeros(((rows + tall - 1) // tall, poses, 1, sums.shape[2]))
     counter = np.zeros(1, np.int64)
     job = (counter, member, width, scale, start, count, length, p, rel, pair, poses, counted, tangent, parts)
-    shared(_sum_tiles, threads if count * poses >= WORTH else np.int64(1), job)
+    shared(_sum_tiles, threads if count * poses >= WORTH_THREADS else np.int64(1), job)
     for i in range(parts.shape[0]):
         for j in range(poses):
             for s in range(sums.shape[2]):
@@ -432,7 +432,7 @@ def grid_designs(member, width, start, count, length, k, rel, u, pair, threads, 
       out (M or more,): added to.
     """
     counter = np.zeros(1, np.int64)
-    if count < MANY or count * rel.shape[0] < WORTH:
+    if count < MANY or count * rel.shape[0] < WORTH_THREADS:
         _design_tiles(counter, member, width, start, count, length, k, rel, u, pair, out)
         return
     shared(_design_tiles, threads, (counter, member, width, start, count, length, k, rel, u, pair, out))

@@ -11,12 +11,12 @@ from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, PermanentSet, 
 
 OPEN, ELASTIC, CRUSHING = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide
-NEAR = 1e-12
+AT_SWITCH = 1e-12
 
 
 @inline
 def crush_force(p, x, mode):
-    """Force, its slopes by x and xd, and energy with its slope by x; the energy is what it gives back, f^2 / (2 k)."""
+    """Force, its slopes by x and xd, energy and its slope by x; energy is what unloading gives back, f^2 / (2 k)."""
     if mode == OPEN:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     if mode == CRUSHING:
@@ -122,7 +122,7 @@ def crush_next(p, x, mode):
 def crush_start(p, x, xd, xdd):
     """The mode at the start, by the elongation; at the gap or beyond the plateau its rate decides, then the second."""
     y = p[3] * x - p[2]
-    near = NEAR * max(1.0, abs(p[2]))
+    near = AT_SWITCH * max(1.0, abs(p[2]))
     ahead = p[3] * (xd if xd != 0.0 else xdd)
     if y < -near or (y <= near and ahead < 0.0):
         return OPEN

@@ -87,8 +87,11 @@ def curve_margins(p, mode):
 
 @inline
 def curve_one_margin(p, which, x, mode, curves):
-    """How far x is from the lower or, where there is none or it is the second, the upper end of its piece (m), and
-    slopes by x, xd and time."""
+    """One margin of a piece of the curve (m), and its slopes by x, xd and time.
+
+    which: 0 is the distance of x to the lower end of the piece, 1 that to the upper end. The first piece has no lower
+    end: there 0 is the distance to the upper one.
+    """
     at = int(p[0])
     if which == 0 and mode > 1:
         return x - curves[at + mode - 2] + p[3], 1.0, 0.0, 0.0

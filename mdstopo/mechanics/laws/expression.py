@@ -26,7 +26,7 @@ AT = 7
 #: the bit of a mode in which nothing acts
 IDLE = 2**MOST_SWITCHES
 #: margins that are smaller than this, times the size of things, are zero where something begins
-NEAR = 1e-13
+ZERO_MARGIN = 1e-13
 
 
 def expression_data(record: OfFormulas, at: int) -> tuple[list[float], list[float]]:
@@ -358,7 +358,7 @@ def _side(p, x, xd, xdd, mode, t, curves, l0, switch):
     switch: its number.
     """
     g, by_x, by_rate, by_time, _ = _seen(p, x, xd, mode | (1 << switch), t, curves, l0, switch)
-    if abs(g) > NEAR * max(1.0, abs(x)):
+    if abs(g) > ZERO_MARGIN * max(1.0, abs(x)):
         return 1 if g > 0.0 else 0
     rate = by_x * xd + by_rate * xdd + by_time
     if rate == 0.0:
@@ -386,7 +386,7 @@ def expression_next(p, x, xd, xdd, mode, t, curves, l0):
         return mode
     mode &= IDLE - 1
     new = mode ^ (1 << who)
-    near = NEAR * max(1.0, abs(x))
+    near = ZERO_MARGIN * max(1.0, abs(x))
     for switch in range(int(curves[int(p[AT]) + 2])):
         if switch == who:
             continue

@@ -10,7 +10,7 @@ from mdstopo.mechanics.laws.law_kernels import LawKernels, Modes, always
 
 OPEN, CLOSED, CLIPPED = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide
-NEAR = 1e-12
+AT_SWITCH = 1e-12
 #: rates below this are rest (m/s): they decide nothing, as rounding alone moves bodies so fast
 REST = 1e-10
 
@@ -136,7 +136,7 @@ def gap_next(p, x, xd, xdd, mode):
     """
     y = p[3] * x - p[2]
     rate = p[3] * xd
-    near = NEAR * max(1.0, abs(p[2])) if abs(rate) > REST else 0.0
+    near = AT_SWITCH * max(1.0, abs(p[2])) if abs(rate) > REST else 0.0
     if y > near:
         if mode == OPEN:
             return _closed(p, y, rate)
@@ -154,7 +154,7 @@ def gap_start(p, x, xd, xdd):
     """The mode at the start; what rests exactly at the gap has reached it."""
     y = p[3] * x - p[2]
     rate = p[3] * xd
-    near = NEAR * max(1.0, abs(p[2]))
+    near = AT_SWITCH * max(1.0, abs(p[2]))
     if y < -near:
         return OPEN
     if y <= near:

@@ -1,4 +1,4 @@
-"""What is to be achieved: responses, objectives, constraints, and the settings of the methods."""
+"""Parts of the optimisation problem: responses, objectives, constraints, variables, and the settings of methods."""
 
 from __future__ import annotations
 
@@ -171,6 +171,10 @@ class ResponseRow(Value):
     load_case: str
     bound: float
     sense: str
+
+
+#: what is evaluated of a load case: a response with its reduction over time
+ReducedResponse = Objective | ResponseRow
 
 
 @frozen

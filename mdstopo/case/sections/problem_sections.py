@@ -118,7 +118,7 @@ def build_objectives(top: Fields, frames: Frames, reading: Reading) -> tuple[Obj
 
 
 def load_case_of(fields: Fields, top: Fields, reading: Reading) -> str | None:
-    """The load case that an aim, or a measurement, is about; None where that is a mistake, which is noted."""
+    """The load case of a reduced response or of a measurement; None where there is a mistake, which is noted."""
     cases, stated = top["load_cases"], fields["load_case"]
     if cases is BAD or stated is BAD:
         return None
