@@ -119,6 +119,45 @@ def test_gradients_through_kinks_and_jumps_are_those_of_differences(
         assert abs(gradient @ direction - expected[name]) <= error * size, name
 
 
+#: a body on a pin, which turns round: the speed of its point is 0.8 m times its angular velocity
+SWING = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 2}
+bodies: {load: {mass: 2, inertia: 0.3, position: [0.5, 0], velocity: [0, 0.5], angular_velocity: 1}}
+joints: [{type: revolute, bodies: [ground, load], at: [0, 0]}]
+points:
+  hooks: {body: ground, grid: {list: [[0.5, 1.2], [1, 1]]}}
+  eyes: {body: load, grid: {list: [[0.5, 0.1], [0.8, 0]]}}
+members: {belts: {from: hooks, to: eyes, connect: pairs, law: {type: spring, stiffness: 60, damping: 0.5}}}
+design: {initial: 0.7}
+"""
+
+
+@pytest.mark.parametrize(
+    ("formula", "over_time", "solver", "error"),
+    [
+        ("1 - b + 0.3*d", "max", {"tolerance": 1e-10}, 1e-9),
+        ("1 - b + 0.3*d", "max", {"integrator": "generalized_alpha", "step": 1e-3}, 1e-5),
+        ("b + 0.3*d", "min", {"tolerance": 1e-10}, 1e-9),
+        ("if(d > -9, 1 - b + 0.3*d, 0)", "max", {"tolerance": 1e-10}, 1e-9),
+        ("b - d", "mean", {"tolerance": 1e-10}, 1e-7),
+    ],
+)
+def test_a_speed_in_an_expression_has_a_kink_where_it_passes_zero(
+    formula: str, over_time: str, solver: dict[str, Any], error: float
+) -> None:
+    d, w = part("displacement"), part("angular_velocity")
+    speed = "{velocity: {body: load, at: [0.8, 0]}}"
+    of_norm, of_sign = expression(formula, b=speed, d=d), expression(formula.replace("b", "abs(b)*0.8"), b=w, d=d)
+    both = {"of_norm": (of_norm, over_time), "of_sign": (of_sign, over_time)}
+    found = mdstopo.evaluate(looking(SWING, both, **solver), [0.4, 0.9])
+    assert found.objectives["of_norm"] == pytest.approx(found.objectives["of_sign"], rel=error)
+    expected = found.gradients["of_sign"]
+    assert np.abs(expected).max() > 1e-4
+    assert np.abs(found.gradients["of_norm"] - expected).max() <= error * np.abs(expected).max()
+
+
 @pytest.mark.parametrize("text", [PLANE, SPACE], ids=["plane", "space"])
 def test_switches_by_time_alone_are_looked_for_once_and_not_along_the_motion(text: str) -> None:
     """The mean from 0.25 s on is that of the whole motion less that of one that ends there."""

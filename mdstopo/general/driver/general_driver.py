@@ -33,6 +33,7 @@ from mdstopo.general.over_time.pieces import Pieces
 from mdstopo.general.over_time.quadrature_breakpoints import MOST_LOOKS, followed_integrals, quadrature_breakpoints
 from mdstopo.general.over_time.switch_changes import moving_switches
 from mdstopo.general.over_time.switch_pieces import switched_integral, switched_peaks
+from mdstopo.general.over_time.zeros_of_norms import complete_at_zeros
 from mdstopo.general.responses.extremes import (
     COLUMNS,
     FRACTION,
@@ -44,7 +45,7 @@ from mdstopo.general.responses.extremes import (
     VALUE,
     row_of,
 )
-from mdstopo.general.responses.general_responses import switches_of
+from mdstopo.general.responses.general_responses import norms_in, switches_of
 from mdstopo.general.responses.integral_reductions import value_of_integral
 from mdstopo.general.responses.response_shapes import shape_of
 from mdstopo.general.scene.compile_general import GeneralScene, compile_general
@@ -436,6 +437,8 @@ class GeneralDriver:
             else:
                 candidates = list(minima(self, j, t))
             n_rows = self.entry.rank_rows(np.array(candidates), window, float(t[-1] - t[0]), rows)
+        if not reduction.at_end:
+            complete_at_zeros(self, j, count, rows[:n_rows])
         self.row_counts[j] = n_rows
         if reduction.is_magnitude:
             rows[:n_rows, VALUE] *= rows[:n_rows, SIGN]
@@ -450,7 +453,7 @@ class GeneralDriver:
         if len(self.scene.reductions) != 1 or self.start is not None:
             return False
         (reduction,), model = self.scene.reductions, self.scene.model
-        plain = reduction.at_end or (reduction.is_largest and switches_of(model, 0) == 0)
+        plain = reduction.at_end or (reduction.is_largest and switches_of(model, 0) == 0 and not norms_in(model, 0))
         plain = plain and not compete(model.response[0, 0], reduction)
         return plain and self.rows.shape[1] * len(self.padded) <= BLOCK
 

@@ -3,7 +3,8 @@
 Such a response has the kind EXPRESSION and no kernels of its own; the responses that it is of stand behind all others
 in `GeneralModel.response`. Which of its kinks and jumps are on which side is the number `who`, in which other responses
 have a member: bits of the switches, as long as which stay the formula is smooth; times MARGINS, in front, the number
-from 1 of a switch whose margin is meant instead of the value; below -1, the same for the bits of the state.
+from 1 of a switch whose margin is meant instead of the value, or, behind all switches, of a response that it is of;
+below -1, the same for the bits of the state.
 """
 
 import numpy as np
@@ -68,7 +69,7 @@ def formula_value(model, j, who, p, t, slopes):
     Constant:
       model, j: the compiled scene, and which response.
     In:
-      who: bits of the switches, perhaps with a switch whose margin is meant; below 0: no bit is set.
+      who: bits of the switches, perhaps with a switch whose margin is meant, or a response; below 0: no bit is set.
       p (numbers_of,): values of the responses that it is of, then its parameters.
       t: time (s).
     Out:
@@ -83,6 +84,10 @@ def formula_value(model, j, who, p, t, slopes):
     if who > 0:
         mode = np.int64(who % MARGINS)
         switch = who // MARGINS
+        if switch > model.response[j, SWITCHES]:
+            slopes[:] = 0.0
+            slopes[switch - 1 - model.response[j, SWITCHES]] = 1.0
+            return p[switch - 1 - model.response[j, SWITCHES]], 0.0
         if switch > 0:
             group = np.int64(margin_group(model, j, switch - 1))
             behind = group + 1

@@ -16,7 +16,7 @@ from mdstopo.general.model.general_model import GeneralModel
 from mdstopo.general.over_time.minima import LOW_MINIMUM
 from mdstopo.general.over_time.pieces import Pieces
 from mdstopo.general.responses.extremes import FRACTION, STEP, TIME, VALUE, EvaluateAt
-from mdstopo.general.responses.general_responses import has_kinks, has_norm, is_expression
+from mdstopo.general.responses.general_responses import has_kinks, has_norm, is_expression, norms_in
 from mdstopo.general.steps.step_history import EVENTS
 from mdstopo.scene.springs_model import FloatArray
 
@@ -25,15 +25,21 @@ ALL = 1e9
 #: how long the steps beside a norm's zero are, relative to the step that it was found in: the last stage of a step is
 #: off by its length to the sixth power or so
 STEP_BESIDE_ZERO = 0.1
+#: how far from the zero of a norm in an expression steps end, in steps: at the zero itself the norm has no direction,
+#: and what goes on from inside a step is the whole expression. So each step is about as long as it is far from there
+STEPS_BESIDE_ZERO_IN_EXPRESSION = tuple(10.0**-k for k in range(1, 9))
 #: fractions of a step at which values beside a kink are compared, one after the other
 DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
 
 
 def kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
-    """Times inside (t[0], t[-1]) at which steps have to end because response j has a kink there; t (m + 1,): the steps'
-    times. At an event steps end anyway."""
+    """Times inside (t[0], t[-1]) at which steps have to end because response j has a kink there, or a norm in it beside
+    them; t (m + 1,): the steps' times. At an event steps end anyway."""
     happened = np.diff(driver.index_of_steps()[: len(t), EVENTS]) > 0
-    return [time for time in _kinks(driver, j, t) if not _is_at_event(t, t[1:][happened], time)]
+    found = _kinks(driver, j, t)
+    if driver.method.kind.adaptive and driver.settings[2] == 0.0:
+        found += [time for part in norms_in(driver.scene.model, j) for time in _kinks(driver, part, t, True)]
+    return [time for time in found if not _is_at_event(t, t[1:][happened], time)]
 
 
 def _is_at_event(t: FloatArray, events: FloatArray, time: float) -> bool:
@@ -46,8 +52,12 @@ def _is_at_event(t: FloatArray, events: FloatArray, time: float) -> bool:
     return bool(np.any(np.abs(events - time) <= DISTANCES[-1] * (t[step + 1] - t[step])))
 
 
-def _kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
-    """Times inside (t[0], t[-1]) at which response j has a kink, events among them; t (m + 1,): the steps' times."""
+def _kinks(driver: DriverWithRun, j: int, t: FloatArray, in_expression: bool = False) -> list[float]:
+    """Times inside (t[0], t[-1]) at which response j has a kink, events among them, and such beside them.
+
+    t (m + 1,): the steps' times. in_expression: whether response j is a norm in an expression: then none of its zeros
+    is among the times, only such beside them.
+    """
     pieces = Pieces(driver, j, t)
     values, rates = pieces.samples[:, :, 0], pieces.samples[:, :, 1]
     highest = float(np.abs(values).max())
@@ -61,16 +71,17 @@ def _kinks(driver: DriverWithRun, j: int, t: FloatArray) -> list[float]:
         low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
         if low > LOW_MINIMUM * highest or not t[0] < row[TIME] < t[-1]:
             continue
-        w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.evaluate_at)
+        w, c = int(row[STEP]), sharpened(int(row[STEP]), float(row[FRACTION]), pieces.evaluate_at)
         if min(w + c, len(pieces.t) - 1 - w - c) <= DISTANCES[-1]:  # zero from the start, or to the end: no kink
             continue
-        time = float(pieces.t[w] + c * (pieces.t[w + 1] - pieces.t[w]))
-        found.append(time)
+        length = float(pieces.t[w + 1] - pieces.t[w])
+        time = float(pieces.t[w] + c * length)
         around = _around(time, low, rate, float(t[0]), float(t[-1]))
         if not around and turns_round(driver.scene.model, j):
-            beside = STEP_BESIDE_ZERO * float(pieces.t[w + 1] - pieces.t[w])
-            around = [each for each in (time - beside, time + beside) if t[0] < each < t[-1]]
-        found += around
+            shares = STEPS_BESIDE_ZERO_IN_EXPRESSION if in_expression else (STEP_BESIDE_ZERO,)
+            beside = [share * length for share in shares]
+            around = [each for d in beside for each in (time - d, time + d) if t[0] < each < t[-1]]
+        found += around if in_expression else [time, *around]
     return found
 
 
@@ -80,7 +91,7 @@ def turns_round(model: GeneralModel, j: int) -> bool:
     return has_norm(model, j) or is_expression(model, j)
 
 
-def _sharpened(w: int, c: float, evaluate_at: EvaluateAt) -> float:
+def sharpened(w: int, c: float, evaluate_at: EvaluateAt) -> float:
     """Where in step w a value comes down to zero and goes up again: rates near a kink are smeared, values are not.
 
     On both sides the value is a line through zero, so that two values tell where.

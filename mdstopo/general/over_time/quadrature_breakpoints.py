@@ -19,7 +19,7 @@ from mdstopo.general.over_time.kinks import kinks
 from mdstopo.general.over_time.motion_sizes import motion_sizes, rounding_of
 from mdstopo.general.over_time.nested_rules import NestedRules, nested_rules
 from mdstopo.general.over_time.switch_changes import moving_switches
-from mdstopo.general.responses.general_responses import has_kinks, switches_of
+from mdstopo.general.responses.general_responses import has_kinks, norms_in, switches_of
 from mdstopo.general.steps.run_start import method_number
 from mdstopo.general.steps.step_history import FIRST
 from mdstopo.integrators.gauss_tables import LEVELS
@@ -76,7 +76,7 @@ def quadrature_breakpoints(driver: DriverWithRun, count: int, followed: Mapping[
     t = driver.states()[0][: count + 1].copy()
     if not driver.quadrature_breakpoints:
         for j, _ in integrals:
-            if has_kinks(model, j) or moving_switches(driver, j):
+            if has_kinks(model, j) or moving_switches(driver, j) or norms_in(model, j):
                 found += kinks(driver, j, t)
     if not driver.method.kind.adaptive or driver.settings[2] > 0.0:
         return found

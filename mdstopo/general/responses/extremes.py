@@ -19,7 +19,8 @@ from mdstopo.scene.springs_model import FloatArray
 TIME, VALUE, STEP, FRACTION, RATE, SIGN, WHO, OTHER, SHARE = range(9)
 COLUMNS = 9
 #: in column OTHER in place of a member: there is none; the value is a zero, and stays one for designs nearby. One from
-#: MARGINS on (`expressions`) is the margin of a switch that changes there, whose derivative is added
+#: MARGINS on (`expressions`) is the margin of a switch that changes there, or a norm that passes zero; its derivative
+#: is added
 NOBODY, ZERO = -1.0, -2.0
 #: how many numbers are seen of a response at a place: value, rate, member
 SEEN = 3

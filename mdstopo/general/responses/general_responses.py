@@ -851,6 +851,14 @@ def has_norm(model: GeneralModel, j: int) -> bool:
     return LISTED[int(model.response[j, KIND])].vector is not None and int(model.response[j, COMPONENT]) == NORM
 
 
+def norms_in(model: GeneralModel, j: int) -> list[int]:
+    """Those of the responses that expression j is of which are norms of vectors; none where j is no expression."""
+    if not is_expression(model, j):
+        return []
+    first = int(model.response[j, FIRST_PART])
+    return [part for part in range(first, first + int(model.response[j, PARTS])) if has_norm(model, part)]
+
+
 def has_kinks(model: GeneralModel, j: int) -> bool:
     """Whether response j may have kinks in time; `kinked`, called from Python."""
     return is_absolute(model, j) or has_norm(model, j)
