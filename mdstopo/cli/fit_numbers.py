@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mdstopo.cli.output import Output, number
-from mdstopo.fit.sentences import correlated, undetermined
+from mdstopo.fit.sentences import correlated, improved, undetermined
 
 Content = Mapping[str, Any]
 
@@ -13,7 +13,7 @@ def say_fit(output: Output, content: Content) -> None:
     """Estimates, what the data cannot tell, what is left of each series. content: of `fit.fit_record.content`."""
     if "value" in content["estimates"][0]:
         output.table(_estimate_rows(content))
-        for sentence in (*undetermined(content), *correlated(content)):
+        for sentence in (*improved(content), *undetermined(content), *correlated(content)):
             output.say(sentence)
         output.table(_series_rows(content))
     rows = [["simulations", str(content["simulations"])]]

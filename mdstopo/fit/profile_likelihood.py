@@ -22,6 +22,7 @@ REACH = 1.6
 class Profile:
     """values (k,), rising, where the estimate was held, and t (k,) there, with the side's sign; NaN: no motion there.
 
+    Where the fit with the estimate held is better than the minimum, t has the other side's sign.
     low, high: the ends of the interval, NaN where the points do not reach them.
     """
 
@@ -54,18 +55,23 @@ def profile(
             if there.status == "failed":
                 side.append((float(x[i]), np.nan))
                 continue
-            side.append((float(x[i]), way * float(np.sqrt(2.0 * max(there.cost - found.cost, 0.0)))))
+            worse = there.cost - found.cost
+            side.append((float(x[i]), way * float(np.copysign(np.sqrt(2.0 * abs(worse)), worse))))
             x = there.x.copy()
         sides.append(side)
     rows = np.array([*sides[0][::-1], (found.x[i], 0.0), *sides[1]])
-    low, high = (_end(np.array([(found.x[i], 0.0), *side]), at_best.factor) for side in sides)
+    low, high = (
+        _end(np.array([(found.x[i], 0.0), *side]) * (1.0, way), at_best.factor)
+        for way, side in zip((-1.0, 1.0), sides, strict=True)
+    )
     return Profile(rows[:, 0], rows[:, 1], low, high)
 
 
 def _end(side: FloatArray, factor: float) -> float:
-    """Where |t| reaches a factor along one side (k, 2) of values and t, outwards; NaN where it does not."""
+    """Where t, with the side's sign taken off, reaches a factor along one side (k, 2) of values and t, outwards; NaN
+    where it does not."""
     side = side[np.isfinite(side[:, 1])]
-    t = np.abs(side[:, 1])
+    t = side[:, 1]
     beyond = np.flatnonzero(t >= factor)
     if not len(beyond):
         return float("nan")

@@ -1,10 +1,31 @@
-"""What a fit's data cannot tell, in sentences."""
+"""What a fit's data cannot tell, and where a profile has met a better fit, in sentences."""
 
 from collections.abc import Mapping
 from typing import Any
 
 #: estimates with a larger correlation are named
 CORRELATED = 0.95
+#: a profile whose squares fall by less than this has found the same minimum, to rounding
+LESS = 1e-3
+
+
+def improved(content: Mapping[str, Any]) -> list[str]:
+    """Where a profile has met a better fit than the one that is told: a sentence, on the best of them. content: of
+    `fit_record`."""
+    found = []
+    for each in content["estimates"]:
+        own = each.get("profile", {"values": (), "t": ()})
+        for value, t in zip(own["values"], own["t"], strict=True):
+            if t is not None and t * (value - each["value"]) < 0.0:
+                found.append((float(t) ** 2, each["name"], float(value)))
+    less, name, value = max(found, default=(0.0, "", 0.0))
+    if not less > LESS:
+        return []
+    return [
+        f"there is a better fit: with {name} held at {value:.6g} and the others fitted anew the squares are {less:.3g} "
+        "less; intervals and profiles here are not those of the best fit: begin with "
+        f"`initial: {value:.6g}` of {name}, or try more starts (`fit.starts`)"
+    ]
 
 
 def undetermined(content: Mapping[str, Any]) -> list[str]:

@@ -35,7 +35,14 @@ def profile_curves(estimate: Mapping[str, Any], profile: Mapping[str, Any]) -> P
     fine = np.linspace(values[0], values[-1], FINE)
     factor, straight = ((x - estimate["value"]) / estimate["deviation"] for x in (estimate["high"], fine))
     between = np.interp(fine, values[known], t[known])
-    return ProfileCurves(values[known], t[known] ** 2, fine, between**2, straight**2, float(factor**2))
+
+    def rise(at: Floats, seen: Floats) -> Floats:
+        """How much the squares rise; where t has the other side's sign they fall."""
+        return np.asarray(np.sign(at - estimate["value"]) * seen * np.abs(seen))
+
+    return ProfileCurves(
+        values[known], rise(values[known], t[known]), fine, rise(fine, between), straight**2, float(factor**2)
+    )
 
 
 def fitted_curves(source: Source, content: Mapping[str, Any]) -> dict[str, tuple[Floats, Floats]]:

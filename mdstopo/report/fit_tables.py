@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.fit.fit_record import content as content_of
-from mdstopo.fit.sentences import correlated, undetermined
+from mdstopo.fit.sentences import correlated, improved, undetermined
 from mdstopo.plots.fitted_curves import fitted_curves, profile_curves
 from mdstopo.plots.source import Source
 
@@ -29,7 +29,7 @@ def fit_part(source: Source, curves: bool = True, rows: int = 0) -> dict[str, An
     return {
         "confidence": content["confidence"],
         "estimates": content["estimates"],
-        "sentences": [*undetermined(content), *correlated(content)],
+        "sentences": [*improved(content), *undetermined(content), *correlated(content)],
         "series": [_series(each, drawn.get(each["name"])) for each in content["series"]],
         "correlation": content["correlation"],
         "profiles": [

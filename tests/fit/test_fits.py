@@ -16,6 +16,7 @@ from mdstopo.fit.least_squares import StoppedError, fitted, minimum, starts
 from mdstopo.fit.predictions import Predicted
 from mdstopo.fit.profile_likelihood import profile
 from mdstopo.fit.run_fit import FitRun, Start, run_fit
+from mdstopo.fit.sentences import improved
 from mdstopo.fit.statistics import statistics
 
 from .scenes import DROP, PAIR, measured, problem_of
@@ -153,6 +154,27 @@ def test_profiles_of_a_parabola_are_the_intervals(drop: FitProblem) -> None:
     # beside the minimum, with the others fitted anew, the cost is what it says
     held = minimum(problem, np.array([seen.values[-1], *found.x[1:]]), found.deviation, held=np.array([0]))
     assert 2.0 * (held.cost - found.cost) == pytest.approx(seen.t[-1] ** 2, rel=1e-6)
+
+
+def test_a_profile_that_meets_a_better_fit_says_so(drop: FitProblem) -> None:
+    """Beside a place that is no minimum, as a local one is beside a lower one, the squares fall."""
+    problem = measured(drop, TRUTH, 6)
+    best = fitted(problem, problem.initial)
+    told = statistics(problem, best)
+    away = best.x + np.eye(len(best.x))[0] * told.factor * told.deviation[0]
+    poor = minimum(problem, away, best.deviation, held=np.array([0]))
+    seen = profile(problem, poor, statistics(problem, poor), 0, 3, lambda: False)
+    fall = np.array([seen.t[k] ** 2 for k in range(3)])
+    assert np.all(seen.t[:3] > 0.0)  # the other side's sign
+    assert fall.max() == pytest.approx(2.0 * (poor.cost - best.cost), rel=0.3)
+    own = {"values": seen.values.tolist(), "t": seen.t.tolist()}
+    (sentence,) = improved({"estimates": [{"name": "k", "value": float(poor.x[0]), "profile": own}]})
+    k = int(np.argmax(fall))
+    assert f"with k held at {seen.values[k]:.6g} and the others fitted anew" in sentence
+    assert f"the squares are {fall[k]:.3g} less" in sentence
+    true = profile(problem, best, told, 0, 3, lambda: False)
+    own = {"values": true.values.tolist(), "t": true.t.tolist()}
+    assert not improved({"estimates": [{"name": "k", "value": float(best.x[0]), "profile": own}]})
 
 
 def test_starts_spread_over_the_bounds_and_the_best_is_kept(drop: FitProblem) -> None:

@@ -75,11 +75,42 @@ def test_a_redundant_link_changes_no_motion_and_shares_the_load(integrator):
     assert shared.lam[:, 2] == pytest.approx(0.5 * (shared.lam[:, 0] + shared.lam[:, 1]), abs=1e-9)
 
 
-def test_a_response_on_a_redundant_joint_is_refused():
+@pytest.mark.parametrize("asked", ["left", "right", "middle"])
+def test_a_response_on_a_redundant_joint_is_refused(asked):
+    """Whatever place it has in the file: what each of three links carries is open."""
     extra = "  - {name: middle, type: distance, bodies: [ground, coupler], at: [[0.5, 0], [0.5, -1]]}"
-    text = PARALLELOGRAM.format(extra=extra) + "objectives: {F: {response: {joint_force: {joint: middle}}}}\n"
-    with pytest.raises(mdstopo.CaseError, match="middle has equations that follow from other joints"):
+    text = PARALLELOGRAM.format(extra=extra) + f"objectives: {{F: {{response: {{joint_force: {{joint: {asked}}}}}}}}}\n"
+    with pytest.raises(mdstopo.CaseError, match=f"{asked} has equations that follow from other joints"):
         mdstopo.evaluate(read_case(text))
+
+
+def test_beside_joints_that_repeat_each_other_the_others_keep_their_forces():
+    """A bob of 2 kg hangs from the coupler: its pin carries what it weighs."""
+    extra = """  - {name: middle, type: distance, bodies: [ground, coupler], at: [[0.5, 0], [0.5, -1]]}
+  - {name: pin, type: revolute, bodies: [coupler, bob], at: [0.5, -1]}"""
+    bob = "bodies:\n  bob: {mass: 2, inertia: 1, position: [0.5, -2]}"
+    text = PARALLELOGRAM.format(extra=extra).replace("bodies:", bob, 1)
+    text += "objectives: {F: {response: {joint_force: {joint: pin}}, over_time: min}}\n"
+    assert mdstopo.evaluate(read_case(text)).status.ok
+
+
+DOOR = """
+format: 1
+dimension: 3
+gravity: [0, 0, -9.81]
+time: {end: 0.1}
+bodies: {door: {mass: 30, inertia: [8, 5, 3], position: [0.5, 0, 0]}}
+joints:
+  - {name: low, type: revolute, bodies: [ground, door], at: [0, 0, -0.8], axis: [0, 0, 1]}
+  - {name: high, type: revolute, bodies: [ground, door], at: [0, 0, 0.8], axis: [0, 0, 1]}
+objectives: {F: {response: {joint_force: {joint: ASKED}}}}
+"""
+
+
+@pytest.mark.parametrize("asked", ["low", "high"])
+def test_neither_hinge_of_a_door_has_a_force_of_its_own(asked):
+    with pytest.raises(mdstopo.CaseError, match=f"{asked} has equations that follow from other joints"):
+        mdstopo.evaluate(read_case(DOOR.replace("ASKED", asked)))
 
 
 def test_joints_that_contradict_each_other_are_told_when_they_tear():

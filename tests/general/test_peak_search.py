@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
 from mdstopo.general.peaks import peak_search
@@ -14,6 +15,26 @@ from tests.space.in_python import in_python
 __all__ = ["in_python"]
 
 ALL = Rows(window=1.0, most=8)
+
+#: a driven slide whose velocity is 0 at 0, 1, 1.5 and 2 s, where it is at 0, 0.9, 0.45 and 1 m
+MOVED = """
+format: 1
+time: {end: 2}
+bodies:
+  slide: {mass: 1, inertia: 1, position: [0, 0]}
+  load: {mass: 1, inertia: 1, position: [0, 1]}
+motions:
+  - body: slide
+    x: {velocity: {table: [[0, 0], [0.5, 1.8], [1, 0], [1.25, -1.8], [1.5, 0], [1.75, 2.2], [2, 0]]}}
+    y: {velocity: 0}
+    angle: {velocity: 0}
+members:
+  tie: {from: {body: slide, at: [0, 0]}, to: {body: load, at: [0, 1]}, law: {type: spring, stiffness: 9}}
+objectives:
+  reach: {response: {displacement: {body: slide, component: x}}}
+constraints:
+  - {response: {displacement: {body: slide, component: x}}, over_time: max, limit: 0.95}
+"""
 SOLVERS = pytest.mark.parametrize("solver", [{}, IMPLICIT], ids=["rk", "alpha"])
 
 
@@ -121,6 +142,34 @@ def test_a_peak_between_steps_may_have_a_rate_of_exactly_zero(before, behind, pe
     side = np.array([[before], [behind]])
     values = side * np.where(times < 0.0, -1.0, 1.0) * 0.5 * times**2
     assert places_of_peaks(values, side * np.abs(times)) == peaks
+
+
+@pytest.mark.parametrize(
+    ("ends", "peaks"),
+    [
+        ([(0.0, 1.0)], [(1.0, 1.0)]),  # rises, and comes to rest at the end of the motion
+        ([(1.0, 0.0)], [(0.0, 1.0)]),
+        ([(0.0, 1.0), (1.0, 1.0)], [(1.0, 1.0)]),  # rises, and then rests: one peak, where it has come to rest
+        ([(0.0, 1.0), (1.0, 1.0), (1.0, 0.0)], [(1.0, 1.0)]),
+        ([(1.0, 0.0), (0.0, 0.0), (0.0, 2.0)], [(3.0, 2.0), (0.0, 1.0)]),
+    ],
+)
+def test_what_comes_to_rest_with_a_rate_of_exactly_zero_has_its_peak_there(ends, peaks, in_python):
+    """Steps from one value to another, at rest at both: 3 c^2 - 2 c^3 of the way at the fraction c."""
+    c = np.linspace(0.0, 1.0, SAMPLES)
+    values = np.array([a + (b - a) * (3.0 * c**2 - 2.0 * c**3) for a, b in ends])
+    rates = np.array([(b - a) * 6.0 * c * (1.0 - c) for a, b in ends])
+    assert places_of_peaks(values, rates) == peaks
+
+
+def test_a_move_that_ends_at_rest_is_highest_at_its_end():
+    """Out by 0.9 m, half of it back, and out to 1 m: the largest travel is 1 m at the end, where the velocity is 0."""
+    case = read_case(MOVED)
+    evaluation = Evaluator(case).evaluate(case.start, gradient=False, rows=Rows(window=0.3, most=8))
+    assert evaluation.objectives["reach"] == pytest.approx(1.0, rel=1e-9)
+    assert [peak.time for peak in evaluation.peaks["reach"]] == pytest.approx([2.0, 1.0], abs=1e-9)
+    (above,) = evaluation.constraints
+    assert above == pytest.approx(1.0 - 0.95, rel=1e-9)
 
 
 def test_a_peak_may_lie_at_a_sample_within_a_step(in_python, monkeypatch):

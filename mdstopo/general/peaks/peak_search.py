@@ -477,6 +477,18 @@ def moves_off(seen, plain, sign, size):
 
 
 @kernel
+def rises_last(seen, plain, sign, size):
+    """Whether a response whose rate is 0 at the end of the motion rises into it (1) or not (0); one that has come to
+    rest before has its peak there.
+
+    seen (P, SAMPLES, 3), plain (P,), sign, size: of `moves_off`.
+    """
+    last = seen.shape[0] - 1
+    rise = sign * (seen[last, LAST, G] - seen[last, 0 if plain[last] != 0 else LAST - 1, G])
+    return 1.0 if rise > ROUNDING * size else 0.0
+
+
+@kernel
 def peaks_between(t, seen, plain, sign, limit, rows, found):
     """Peaks at the ends of pieces: a rise into one, or a fall out of it.
 
@@ -511,8 +523,10 @@ def peaks_between(t, seen, plain, sign, limit, rows, found):
             # as where something sticks: what the samples beside it rise and fall by tells
             d_left = sign * seen[b - 1, 0 if plain[b - 1] != 0 else LAST - 1, DG]
             d_right = sign * seen[b, LAST if plain[b] != 0 else 1, DG]
-            if d_left <= 0.0 or d_right >= 0.0:
+            if d_left <= 0.0 or d_right > 0.0:  # level behind it: a plateau, whose peak is where it begins
                 d_left = d_right = 0.0
+        if b == m and before and d_left == 0.0:
+            d_left = rises_last(seen, plain, sign, size)
         jump = 0 < b < m and abs(left - right) > JUMP * size
         level_right = d_left > flat and d_right <= flat
         level_left = d_right < -flat and d_left >= -flat

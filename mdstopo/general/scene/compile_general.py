@@ -1,5 +1,6 @@
 """A case and one of its load cases, compiled into the arrays of a general scene (`GeneralModel`), once."""
 
+from collections.abc import Set
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,7 +19,7 @@ from mdstopo.general.scene.driven_integrals import integration_times
 from mdstopo.general.scene.drives import Drives, drives, drives_all, motion_times
 from mdstopo.general.scene.expression_rows import expression_codes, expression_data
 from mdstopo.general.scene.extent import size_of
-from mdstopo.general.scene.layout import arrange
+from mdstopo.general.scene.layout import arrange, undetermined
 from mdstopo.general.scene.timed_loads import kink_times, mistake_of, parts_of, timed_loads
 from mdstopo.general.scene.timed_switches import switch_times
 from mdstopo.general.scene.variables import (
@@ -129,7 +130,9 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     members["curves"] = curves
     steady = [dimension.joint_kernels(type(each)).steady for each in case.joints]
     layout = arrange(case, joint, joint_par, steady, free, mass, home, pair, bodies)
-    _refuse_redundant(case, load_case, layout.redundant)
+    if layout.redundant and any(each.joint for _, row in rows_of_responses(case) for each in row.response.parts):
+        open_forces = undetermined([each.name for each in case.joints], joint, joint_par, free, home, bodies)
+        _refuse_redundant(case, load_case, {*layout.redundant, *open_forces})
     damped = bodies.turns_couple or _damped(case, responses, reductions)
     by_order_8 = damped or _switches(case)
     entries = varied(case, members["block"])
@@ -218,8 +221,9 @@ def _refuse_impacts(case: Case, load_case: LoadCase, bodies: Kinematics, made: D
         raise CaseError(mistakes, str(case.path or case.name))
 
 
-def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...]) -> None:
-    """A joint that others imply has no force of its own to evaluate (CaseError)."""
+def _refuse_redundant(case: Case, load_case: LoadCase, redundant: Set[str]) -> None:
+    """A joint that shares what it carries with others has no force of its own to evaluate (CaseError). redundant: the
+    names of these."""
     mistakes = []
     for path, row in rows_of_responses(case):
         names = [each.joint for each in row.response.parts if each.joint in redundant]

@@ -18,6 +18,8 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 
 #: a row of which no larger share than this is independent of the others is implied by them
 INDEPENDENT = 1e-9
+#: of multipliers that hold each other in balance, of norm 1, a smaller force on a joint than this is rounding
+SHARED = 1e-7
 #: unknowns up to which their natural order is good enough
 FEW_UNKNOWNS = 30
 
@@ -125,6 +127,41 @@ def _in_runs(products: list[tuple[int, int, int]]) -> IndexArray:
         else:
             runs.append([entry, one, two, 1])
     return np.array(runs, dtype=np.int64).reshape(-1, 4)
+
+
+def undetermined(
+    names: Sequence[str], joint: IndexArray, joint_par: FloatArray, free: IndexArray, home: FloatArray,
+    bodies: Kinematics,
+) -> tuple[str, ...]:  # fmt: skip
+    """Names of the joints whose forces are not determined, for others may take what they carry.
+
+    Multipliers that hold each other in balance, without any load, may be added to those of the motion: the left null
+    space of Phi_q. What they put on a joint as a force is open. In space one direction is allowed: hinges of a linkage
+    that moves in a plane have it across the plane, where the linkage carries nothing.
+
+    names: of the joints. joint, joint_par, free, home, bodies: as of `arrange`.
+    """
+    each, across = bodies.freedoms, bodies.freedoms - bodies.rotations
+    jac = _slopes(joint, joint_par, home, bodies)
+    slopes: list[FloatArray] = []
+    owner: list[tuple[int, int]] = []
+    for j, (_, a, b, _, rows) in enumerate(joint.tolist()):
+        coordinates = [*range(each * a, each * (a + 1)), *range(each * b, each * (b + 1))]
+        for r in range(rows):
+            dense = np.zeros(len(free))
+            np.add.at(dense, coordinates, jac[j, r])
+            slopes.append(dense * free)
+            owner.append((j, r))
+    left, values, _ = np.linalg.svd(np.array(slopes))
+    balanced = left[:, np.count_nonzero(values > INDEPENDENT * values[0]) :]
+    forces = np.zeros((len(joint), across, balanced.shape[1]))
+    for (j, r), multipliers in zip(owner, balanced, strict=True):
+        forces[j] += np.outer(jac[j, r, :across], multipliers)
+    return tuple(
+        name
+        for name, force in zip(names, forces, strict=True)
+        if np.count_nonzero(np.linalg.svd(force, compute_uv=False) > SHARED) > across - 2
+    )
 
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray, bodies: Kinematics) -> FloatArray:
