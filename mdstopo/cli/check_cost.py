@@ -58,7 +58,7 @@ def in_words(found: dict[str, Any] | None) -> str:
     if found is None:
         return UNKNOWN
     if "message" in found:
-        return f"fails at the start: {found['message']}"
+        return f"fails with the initial design: {found['message']}"
     each = f"{counted(found['steps'], 'step')}, {counted(found['force_sums'], 'force sum')}"
     if found["points"] > 1:
         each = f"{found['points']} points of {each} or so"
