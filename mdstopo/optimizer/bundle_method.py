@@ -23,7 +23,7 @@ from mdstopo.optimizer.competing_rows import (
 from mdstopo.optimizer.gsao_state import GsaoState
 from mdstopo.optimizer.nearest_feasible import project
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
-from mdstopo.optimizer.safeguards import is_least, nothing_is_left, nothing_is_promised, residual_unit
+from mdstopo.optimizer.safeguards import is_least, is_next_to_nothing, nothing_is_left, residual_unit
 from mdstopo.optimizer.violations import merit, plain_violation, scaled_violation
 from mdstopo.settings.optimizer_presets import Settings
 
@@ -56,7 +56,7 @@ FARTHEST, LEAST_LEFT, MOST_LEFT = 5.0, 0.1, 0.6
 NO_DECREASE = 1e-13
 #: of a smooth objective: the shares of the promised decrease between which a step gains what was promised, how many
 #: such steps in a row show that the curvature is known, and how many times a promise is gained where it was not
-PROMISE_KEPT, TRUE_STEPS, PROMISE_EXCEEDED = (0.5, 2.0), 3, 10.0
+PROMISE_KEPT, TRUE_STEPS, PROMISE_EXCEEDED = (0.5, 1.5), 3, 10.0
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
 #: for a null step, both in shares of those levels
 DECISIVE, NOT_ABOVE = 1e-12, 1e-9
@@ -252,8 +252,8 @@ class BundleMethod:
             trial = self._steer(state, rows, around.flat(FLOOR * steepest), here)
         promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty)
         state.predicted = merit(here[0], here[1:], state.penalty) - promised
-        if state.true_steps >= TRUE_STEPS and self.model.lengths(trial.x - state.alpha)[0] <= LONG_STEP * state.trust:
-            state.promised = min(state.promised, state.predicted)
+        if state.true_steps >= TRUE_STEPS and is_next_to_nothing(state.predicted, state, self.settings.tolerance):
+            state.promised = min(state.promised, self._promise(state, rows, pairs, max(steepest, 1e-300)))
         state.trial = trial.x
         state.multipliers = trial.multipliers
         enough = CARRIED * np.concatenate([[1.0], state.penalty])
@@ -291,6 +291,25 @@ class BundleMethod:
 
     # -- how
 
+    def _promise(self, state: GsaoState, rows: Bundle, pairs: SecantPairs, steepest: float) -> float:
+        """What the curvature that steps have shown promises, of any step within the bounds; infinite where that cannot
+        be told.
+
+        Directions that no step has gone along are taken to be so flat that a whole range would change the objective by
+        the tolerance: next to nothing is promised only where the gradient has next to no part along them. In the model
+        that steps come from they have the curvature of the last step, and where that was a stiff one nearly nothing is
+        promised along what is flat and not known.
+
+        rows: the model's; pairs, steepest: of `RowModel.around`.
+        """
+        here = rows.subset(rows.own).levels(len(state.penalty) + 1)
+        flattest = pairs._replace(first=self.settings.tolerance * abs(state.objective))
+        trial = self.model.around(state.alpha, (np.inf, np.inf), flattest, steepest).solve(rows, state.penalty)
+        if not trial.solved:
+            return float("inf")
+        there = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty)
+        return merit(here[0], here[1:], state.penalty) - there
+
     def _is_smooth(self, state: GsaoState) -> bool:
         """Whether what is lowered now has no peaks; the largest violation, which limits are restored by, may have."""
         return self.smooth and not state.restoring
@@ -317,11 +336,9 @@ class BundleMethod:
         return True
 
     def _is_confirmed(self, state: GsaoState) -> bool:
-        """Whether rows that were found after others had been dropped leave nothing to be gained, or a curvature that is
-        known does."""
-        tolerance = self.settings.tolerance
-        return state.violation <= tolerance and (
-            nothing_is_promised(state, tolerance) or nothing_is_left(state, self.most_to_gain(state), tolerance)
+        """Whether rows that were found after others had been dropped leave nothing to be gained."""
+        return state.violation <= self.settings.tolerance and nothing_is_left(
+            state, self.most_to_gain(state), self.settings.tolerance
         )
 
     def _trust_after_step(self, trust: float, size: float, ratio: float) -> float:

@@ -90,11 +90,13 @@ class FeasibleSet:
 
 class SecantPairs(NamedTuple):
     """What curvature is learnt from: steps (m, N), the oldest first, and changes (m, N) of the Lagrangian's gradient
-    over them; smooth: whether the objective has no peaks (`problem.Problem`)."""
+    over them; smooth: whether the objective has no peaks (`problem.Problem`); first: the curvature of directions that
+    no step has gone along, in ranges, None: that of the last step."""
 
     steps: Slopes
     changes: Slopes
     smooth: bool = False
+    first: float | None = None
 
 
 class Around(Protocol):
@@ -370,7 +372,7 @@ def curvature_of(pairs: SecantPairs, steepest: float, range_: Floats) -> Curvatu
     steps, changes = pairs.steps, pairs.changes
     assert isinstance(steps, np.ndarray)
     assert isinstance(changes, np.ndarray)
-    found = learnt(steps / range_, changes * range_, FLOOR * steepest, scaled_down=not pairs.smooth)
+    found = learnt(steps / range_, changes * range_, FLOOR * steepest, not pairs.smooth, pairs.first)
     return found.scaled(1.0 / range_, 1.0)
 
 

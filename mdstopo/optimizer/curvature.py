@@ -64,14 +64,16 @@ class Curvature:
         return Curvature(self.diagonal[some], self.factor[some], self.weight)
 
 
-def learnt(steps: Floats, changes: Floats, floor: float, scaled_down: bool = True) -> Curvature:
+def learnt(
+    steps: Floats, changes: Floats, floor: float, scaled_down: bool = True, first: float | None = None
+) -> Curvature:
     """B after steps (m, N), the oldest first, and the changes (m, N) of the Lagrangian's gradient over them.
 
     floor: the least curvature of B before anything is learnt. scaled_down: whether all of B is, where it is far too
-    large along a step.
+    large along a step. first: the curvature before anything is learnt, in the place of that of the last step.
     """
     n = steps.shape[1]
-    sigma = _first(steps, changes, floor)
+    sigma = _first(steps, changes, floor) if first is None else first
     if n > FEW_VARIABLES:
         return _compact(steps[-KEPT_STEPS:], changes[-KEPT_STEPS:], sigma)
     B = sigma * np.eye(n)

@@ -43,9 +43,8 @@ FRESH = 1e-5
 GRADIENT_SHARE = 1e-5
 # What a residual may be at most, in shares of the violation that it says cannot be made smaller.
 RESIDUAL_SHARE = 0.1
-# What a curvature that foretells steps truly may promise at most where a run has converged, in tolerances: from the
-# promises of 1e-5 to 1e-9 of one run on, 6 to 40 times as much was gained until its end.
-PROMISED_SHARE = 1e-2
+# What a curvature that foretells steps truly may promise at most where a run has converged, in tolerances.
+PROMISED_SHARE = 1e-1
 # The largest share of the objective that may be left to be gained and is told of a stalled run.
 SMALL_SHARE = 1e-2
 # The largest objective, constraint or slope of a usable design: steps need squares of them.
@@ -193,7 +192,7 @@ def verdict(
             f"the objective, {state.best_objective:.2g}, cannot be below {bound:g}, and what is left is within the "
             f"tolerance {settings.tolerance:.2g} of what the first design had to lose"
         )
-    if stuck and holds and nothing_is_promised(state, settings.tolerance):
+    if stuck and holds and is_next_to_nothing(state.promised, state, settings.tolerance):
         return RunStatus.CONVERGED, (
             f"the last steps gained what the curvature that was learnt had promised, and it promises no more than "
             f"{state.promised / abs(state.objective):.2g} of the objective"
@@ -256,10 +255,10 @@ def nothing_is_left(state: GsaoState, to_gain: float, tolerance: float) -> bool:
     return to_gain < tolerance * abs(state.objective)
 
 
-def nothing_is_promised(state: GsaoState, tolerance: float) -> bool:
-    """Whether a smooth objective has come to where its curvature, which foretold the last steps truly, promises next to
-    nothing: what is left to be gained is then a small multiple of the promise, far below the tolerance."""
-    return state.promised <= PROMISED_SHARE * tolerance * abs(state.objective)
+def is_next_to_nothing(promise: float, state: GsaoState, tolerance: float) -> bool:
+    """Whether a decrease that a curvature promises, which foretold the last steps truly, is next to nothing: what is
+    left to be gained is then a small multiple of it, far below the tolerance."""
+    return promise <= PROMISED_SHARE * tolerance * abs(state.objective)
 
 
 def is_least(state: GsaoState, tolerance: float) -> bool:

@@ -110,6 +110,7 @@ class WideModel:
             places = self.pool.places(vectors, self.unit)
             _, products = self._products(places)
             sigma = known_curvature(products, half, FLOOR * self._scale * steepest)
+            sigma = sigma if pairs.first is None else pairs.first
             M = compact(products, half, sigma)
             if M is not None:
                 return _WideAround(self, x, reach, sigma, vectors, products, M, scaled=True)

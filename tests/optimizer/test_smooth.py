@@ -98,10 +98,10 @@ def test_curvature_is_scaled_down_as_a_whole_but_for_smooth_objectives(monkeypat
     for smooth in (True, False):
         asked = []
 
-        def known(steps, changes, floor, scaled_down, asked=asked):
+        def known(steps, changes, floor, scaled_down, first, asked=asked):
             if len(steps):
                 asked.append(scaled_down)
-            return learnt(steps, changes, floor, scaled_down)
+            return learnt(steps, changes, floor, scaled_down, first)
 
         monkeypatch.setattr(competing_rows, "learnt", known)
         ended(shaken_block(10, 0.3), smooth)
@@ -189,13 +189,19 @@ def test_a_smooth_energy_goes_on_by_curvature_after_the_separable_model_has_had_
 
 
 def valley(n, spread, rounding, seed=0):
-    """A quadratic with curvatures from 1 to 1/spread in oblique directions, 1 at its least value inside the bounds.
+    """A quadratic with curvatures from 1 to 1/spread in oblique directions; see `quadratic`."""
+    return quadratic(np.logspace(0.0, -np.log10(spread), n), rounding, seed)
+
+
+def quadratic(curvatures, rounding, seed=0):
+    """A quadratic with these curvatures in oblique directions, 1 at its least value inside the bounds.
 
     rounding: relative, of values, and of gradients in the largest entry, as that of adaptive steps.
     """
+    n = len(curvatures)
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(n, n)))[0]
-    matrix = (turn * np.logspace(0.0, -np.log10(spread), n)) @ turn.T
+    matrix = (turn * curvatures) @ turn.T
     least = rng.uniform(0.2, 0.8, n)
 
     def functions(x):
@@ -216,8 +222,21 @@ def test_a_smooth_run_that_says_converged_leaves_less_than_its_tolerance(n, spre
     problem.competes, problem.smooth = True, True
     state = run(Gsao(problem, settings(max_iterations=400)))
     exact = float(valley(n, spread, 0.0).functions(state.best_alpha)[0][0]) - 1.0
-    if not rounding:
+    if not rounding and spread < 1e7:
         assert state.status is RunStatus.CONVERGED
+    assert state.status is not RunStatus.CONVERGED or exact < 1e-6
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-9])
+@pytest.mark.parametrize(("steep", "flat"), [(1e4, 1e-3), (1e6, 1e-4), (1e3, 1e-6)])
+@pytest.mark.parametrize(("n", "stiff"), [(3, 1), (6, 2), (20, 5)])
+def test_what_is_flat_behind_what_is_stiff_is_not_taken_for_an_optimum(n, stiff, steep, flat, rounding) -> None:
+    """Stiff directions are learnt first, and their curvature promises nothing along flat ones, which have 1e-5 to 1e-3
+    of the objective to go."""
+    problem = quadratic(np.where(np.arange(n) < stiff, steep, flat), rounding)
+    problem.competes, problem.smooth = True, True
+    state = run(Gsao(problem, settings(max_iterations=300)))
+    exact = float(problem.functions(state.best_alpha)[0][0]) - 1.0
     assert state.status is not RunStatus.CONVERGED or exact < 1e-6
 
 
@@ -229,7 +248,7 @@ def test_a_flat_optimum_converges_by_the_curvature_that_foretold_the_last_steps(
     assert state.status is RunStatus.CONVERGED
     assert "the curvature that was learnt had promised" in state.reason
     assert state.kkt > 1e-6
-    assert state.promised <= 1e-8 * state.objective
+    assert state.promised <= 1e-7 * state.objective
 
 
 def test_a_long_valley_of_many_variables_is_not_crept_along() -> None:
