@@ -1,4 +1,5 @@
-"""What in a scene is worth a second look before anything runs: what nothing holds, odd scales, steps too long."""
+"""What in a scene is worth a second look before anything runs: what nothing holds, odd scales, bodies left behind,
+mirrored points in another order, steps too long."""
 
 from collections.abc import Iterator
 from typing import Any

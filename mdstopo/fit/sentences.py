@@ -5,12 +5,12 @@ from typing import Any
 
 #: estimates with a larger correlation are named
 CORRELATED = 0.95
-#: a profile whose squares fall by less than this has found the same minimum, to rounding
-LESS = 1e-3
+#: a profile whose squares fall by less than this has met the same minimum, as exactly as fits find it
+LEAST_FALL = 1e-3
 
 
 def improved(content: Mapping[str, Any]) -> list[str]:
-    """Where a profile has met a better fit than the one that is told: a sentence, on the best of them. content: of
+    """A sentence on the best fit that a profile has met, where it is better than the one that is told. content: of
     `fit_record`."""
     found = []
     for each in content["estimates"]:
@@ -19,7 +19,7 @@ def improved(content: Mapping[str, Any]) -> list[str]:
             if t is not None and t * (value - each["value"]) < 0.0:
                 found.append((float(t) ** 2, each["name"], float(value)))
     less, name, value = max(found, default=(0.0, "", 0.0))
-    if not less > LESS:
+    if not less > LEAST_FALL:
         return []
     return [
         f"there is a better fit: with {name} held at {value:.6g} and the others fitted anew the squares are {less:.3g} "

@@ -77,7 +77,7 @@ class Program:
     def is_limited(self) -> bool:
         """Whether limits of another order concern the motion whose peak is minimised.
 
-        They do not where no direction that they see is one that the aim sees.
+        They do not where they look at other directions than the objective does.
         """
         goal = [row for row in self.rows if row.radius is None]
         others = [row.matrix for row in self.rows if row.source.order != goal[0].source.order]

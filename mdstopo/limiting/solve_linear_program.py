@@ -285,7 +285,7 @@ class Solve:
         return tuple(tangent for tangent in kept if tangent in self.tangents)
 
     def _split(self, x: Floats, price: Floats) -> NDArray[np.bool_]:
-        """The cells within which a limit is exceeded by the motion that the averages suggest, or the aim is.
+        """The cells within which a limit is exceeded by the motion that the averages suggest, or the objective is.
 
         Within a cell u is taken as linear with both averages: from 2 a - b to 2 b - a. Where the motion does not matter
         the solution is arbitrary, so cells come first in which or beside which a row has a multiplier.

@@ -55,7 +55,7 @@ FARTHEST, LEAST_LEFT, MOST_LEFT = 5.0, 0.1, 0.6
 #: share of the objective below which a promised decrease is none
 NO_DECREASE = 1e-13
 #: of a smooth objective: the shares of the promised decrease between which a step gains what was promised, how many
-#: such steps in a row show that the curvature is known, and how many times a promise is gained where it was not
+#: such steps in a row show that the curvature is known, and how many times a promise a step gains where it is not
 PROMISE_KEPT, TRUE_STEPS, PROMISE_EXCEEDED = (0.5, 1.5), 3, 10.0
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
 #: for a null step, both in shares of those levels

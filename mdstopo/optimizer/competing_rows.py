@@ -20,7 +20,7 @@ import numpy as np
 
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.conic import Program, Solution, solve
-from mdstopo.optimizer.curvature import FEW_VARIABLES, Curvature, learnt
+from mdstopo.optimizer.curvature import FEW_VARIABLES, KEPT_STEPS, Curvature, learnt
 from mdstopo.optimizer.nearest_feasible import repair
 from mdstopo.optimizer.problem import Bools, Floats, Ints, LinearRows, largest_of_groups, scale_of
 from mdstopo.optimizer.stack import Slopes, Stack, joined
@@ -29,8 +29,9 @@ from mdstopo.optimizer.stack import Slopes, Stack, joined
 #: violated, but little more, or it would reject long steps along a curved limit; the least share of the violation that
 #: could go which has to go; the factor on penalties until it does, and how often
 VIOLATION_COST, STEER, RAISE, RAISES = 1.2, 0.3, 5.0, 8
-#: steps that curvature is learnt from, where B is a matrix, where it is that of a smooth objective, and where B is none
-STEPS, SMOOTH_STEPS, FEW_STEPS = 60, 120, 12
+#: steps that curvature is learnt from where B is a matrix, and where it is that of a smooth objective (elsewhere:
+#: `KEPT_STEPS`)
+STEPS, SMOOTH_STEPS = 60, 120
 #: the least curvature, of the largest gradient entry over the range
 FLOOR = 1e-5
 #: cosine of two gradients from which on they are taken for those of one peak
@@ -176,7 +177,7 @@ class DenseModel:
         Of a smooth objective they are more than it has variables, as far as they may: with as many steps as variables
         the flat directions of a long valley are forgotten before all are known, and it is crept along.
         """
-        most = FEW_STEPS if len(more) > FEW_VARIABLES else SMOOTH_STEPS if smooth else STEPS
+        most = KEPT_STEPS if len(more) > FEW_VARIABLES else SMOOTH_STEPS if smooth else STEPS
         return joined(known, more[None])[-most:]
 
 

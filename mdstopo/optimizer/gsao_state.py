@@ -187,7 +187,7 @@ class GsaoState(State):
             return Shifts(np.array(arrays[name]))
         if name in _ADDED and name not in arrays:
             return _ADDED[name]
-        if name == "cuts_lowered" and name not in arrays:
+        if name == "cuts_lowered" and name not in arrays:  # of older files
             return np.zeros(len(arrays["cuts"]))
         if name == "step":
             array = np.array(arrays[name])
@@ -195,7 +195,7 @@ class GsaoState(State):
         return State._from_arrays(name, arrays)
 
 
-#: what fields are that older files do not have
+#: values of fields that older files do not have
 _ADDED: dict[str, Any] = {"far_design_tried": False, "true_steps": 0, "promised": float("inf")}
 #: fields that are arrays by name themselves
 _PARTS: dict[str, type[Bundle] | type[RowDetails]] = {"bundle": Bundle, "row_details": RowDetails}

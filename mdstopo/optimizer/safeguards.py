@@ -258,7 +258,7 @@ def nothing_is_left(state: GsaoState, to_gain: float, tolerance: float) -> bool:
 def is_next_to_nothing(promise: float, state: GsaoState, tolerance: float) -> bool:
     """Whether a decrease that a curvature promises, which foretold the last steps truly, is next to nothing: what is
     left to be gained is then a small multiple of it, far below the tolerance."""
-    return promise <= PROMISED_SHARE * tolerance * abs(state.objective)
+    return promise < PROMISED_SHARE * tolerance * abs(state.objective)
 
 
 def is_least(state: GsaoState, tolerance: float) -> bool:

@@ -9,7 +9,7 @@ from mdstopo.case.model import Case, Objective, Response, ResponseRow, VolumeRow
 
 def other_problem(case: Case, made: Case) -> str:
     """What the case at a point has otherwise than the case, though designs have to fit both; empty where nothing is."""
-    return next(_members(case, made), "") or next(_aims(case, made), "")
+    return next(_members(case, made), "") or next(_rows(case, made), "")
 
 
 def _members(case: Case, made: Case) -> Iterator[str]:
@@ -46,7 +46,7 @@ def _members(case: Case, made: Case) -> Iterator[str]:
                 )
 
 
-def _aims(case: Case, made: Case) -> Iterator[str]:
+def _rows(case: Case, made: Case) -> Iterator[str]:
     objectives = {objective.name: objective for objective in made.objectives}
     for stated in case.objectives:
         found = objectives.get(stated.name)

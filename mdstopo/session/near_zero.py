@@ -4,12 +4,11 @@ An error is measured relative to the objective. Where a response is very small b
 from, rounding of that motion is larger than the error that the response may have, and steps are made ever shorter.
 """
 
-from collections.abc import Callable
-
 from mdstopo.case.methods.over_time import REDUCTIONS
 from mdstopo.case.model import Case, ReducedResponse, ResponseRow
 from mdstopo.case.responses.response_units import constrained, unit_of_value, words
 from mdstopo.general.responses.extremes import VALUE
+from mdstopo.starts.callbacks import Notify
 
 #: steps that end where they do for the sake of integrals alone, from which on it is told, and how many times as many
 #: they are as the others
@@ -24,7 +23,7 @@ class NearZeroNotice:
     case: the design problem. engine: its evaluator. notify: is given the warning.
     """
 
-    def __init__(self, case: Case, engine: object, notify: Callable[[str], None]) -> None:
+    def __init__(self, case: Case, engine: object, notify: Notify) -> None:
         self._case = case
         self._engine = engine
         self._notify = notify

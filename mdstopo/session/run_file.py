@@ -24,6 +24,7 @@ class RunFile:
 
     path: a place that this process may write, or None. state: what is saved. notify: is given a sentence where a
     checkpoint cannot be written. command: the command line, for the record.
+    warnings: those of the case, as sentences.
     """
 
     def __init__(self, path: Path | None, state: RunState, notify: Notify, command: str) -> None:

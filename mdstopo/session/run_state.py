@@ -112,11 +112,12 @@ class RunState:
         return state.status, state.reason if stage == count else f"stage {stage} of {count}: {state.reason}"
 
     def members_part(self) -> Datasets:
-        """The datasets of the case and its members; a run is resumed with the case as it was read."""
+        """The datasets of the case and its members, which change where a round of pricing builds some; a run is resumed
+        with the case as it was read."""
         return case_part(self.case) | {"resume/case": describe(self.stated)} | self.rounds.part()
 
     def part(self, final_objectives: Floats | None = None) -> Datasets:
-        """The datasets of all that the run has reached beside its members.
+        """The datasets of what changes while the run goes on: rounds of pricing, iterations, sizes, individual optima.
 
         final_objectives (2, n_obj): raw values of the best design and of the last one, where they are known.
         """

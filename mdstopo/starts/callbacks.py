@@ -1,4 +1,4 @@
-"""Callbacks that do nothing, for callers who want none."""
+"""What a caller is told by; and callbacks that do nothing, for callers who want none."""
 
 from collections.abc import Callable
 

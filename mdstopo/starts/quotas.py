@@ -185,7 +185,7 @@ def drop_twins(
         if twin < 0 or not state.running:
             kept.append((index, state))
         else:
-            states[index] = marked = _dropped(state, SAME_OPTIMUM, twin)
+            states[index] = marked = _dropped(state, HAS_TWIN, twin)
             keep(index, marked)
 
 
@@ -204,7 +204,7 @@ def lags(state: State, best: State, tolerance: float) -> bool:
 
 
 #: why a start is dropped that has a twin
-SAME_OPTIMUM = "another start came to the same"
+HAS_TWIN = "another start came to the same"
 
 
 def _dropped(state: State, why: str, twin: int = -1) -> State:
@@ -240,7 +240,7 @@ def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, Stat
         if twin < 0 and good:
             kept.append((index, state))
         elif state.running:
-            states[index] = marked = _dropped(state, SAME_OPTIMUM if twin >= 0 else "other starts were better", twin)
+            states[index] = marked = _dropped(state, HAS_TWIN if twin >= 0 else "other starts were better", twin)
             keep(index, marked)
 
 

@@ -79,7 +79,7 @@ def test_the_worked_examples_do_what_the_page_says(tmp_path: Path) -> None:
     ignored = shutil.ignore_patterns("__pycache__")
     for name in ("mdstopo", "tests", "docs", "documentation", "cases", "packaging"):
         shutil.copytree(ROOT / name, copy / name, ignore=ignored)
-    for name in ("pyproject.toml", "mkdocs.yml"):
+    for name in ("pyproject.toml", "mkdocs.yml", ".importlinter"):
         shutil.copy(ROOT / name, copy)
     make_examples(copy)
     environment = {**os.environ, "PYTHONPATH": str(copy)}

@@ -105,9 +105,8 @@ def test_symbols_are_where_those_of_still_pictures_are_at_each_time(turning: flo
                     near = [line for _, line in lines if len(line) == len(wanted)]
                     assert min(np.abs(line - wanted).max() for line in near) < 1.0
         assert len(marks) == (3 if t > 1.0 else 2)
-        head, _ = (
-            line for colour, line in lines if len(line) == 4 and colour == ink()
-        )  # the arrow of the load; the other is that of gravity
+        # two arrows: that of the load, and that of gravity
+        head, _ = (line for colour, line in lines if len(line) == 4 and colour == ink())
         assert (np.ptp(head, axis=0).max() > 1.0) == (t > 1.0)
 
 

@@ -1,12 +1,11 @@
-"""Integrals over time of what has kinks: a norm that passes zero, the largest force where it passes to
-another member.
+"""Integrals over time of what has kinks: a norm that passes zero, the largest force where it passes to another member.
 
 A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
 first sampled, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
 derivatives bend more sharply than values; for values see `quadrature_breakpoints`). The integrand is continuous at a
 kink, so its time adds no term to the derivative of the integral. Beside a norm's zero the derivative is along a vector
 that all but vanishes, and the last stages of a long step have an error that would turn this vector anywhere. Steps
-beside a zero are therefore short (`STEP_BESIDE_ZERO`).
+beside a zero are therefore short (`STEP_BESIDE_ZERO`; of a norm in an expression `STEPS_BESIDE_ZERO_IN_EXPRESSION`).
 """
 
 import numpy as np
@@ -25,8 +24,9 @@ ALL = 1e9
 #: how long the steps beside a norm's zero are, relative to the step that it was found in: the last stage of a step is
 #: off by its length to the sixth power or so
 STEP_BESIDE_ZERO = 0.1
-#: how far from the zero of a norm in an expression steps end, in steps: at the zero itself the norm has no direction,
-#: and what goes on from inside a step is the whole expression. So each step is about as long as it is far from there
+#: distances from the zero of a norm in an expression at which steps end, in lengths of the step that it was found in:
+#: steps become shorter towards the zero, about as long as they are far from it. None ends at the zero itself, where the
+#: norm has no direction: an expression cannot be followed from inside of a step, as the norm alone is
 STEPS_BESIDE_ZERO_IN_EXPRESSION = tuple(10.0**-k for k in range(1, 9))
 #: fractions of a step at which values beside a kink are compared, one after the other
 DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
@@ -53,10 +53,10 @@ def _is_at_event(t: FloatArray, events: FloatArray, time: float) -> bool:
 
 
 def _kinks(driver: DriverWithRun, j: int, t: FloatArray, in_expression: bool = False) -> list[float]:
-    """Times inside (t[0], t[-1]) at which response j has a kink, events among them, and such beside them.
+    """Times inside (t[0], t[-1]) at which response j has a kink, events among them, and times beside zeros of norms.
 
     t (m + 1,): the steps' times. in_expression: whether response j is a norm in an expression: then none of its zeros
-    is among the times, only such beside them.
+    is among the times, only those beside them.
     """
     pieces = Pieces(driver, j, t)
     values, rates = pieces.samples[:, :, 0], pieces.samples[:, :, 1]

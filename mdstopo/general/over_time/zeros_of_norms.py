@@ -1,11 +1,11 @@
 """Peaks of an expression that stand where the norm of a vector in it passes zero.
 
-There the norm b has a kink, and with it the expression g; the time t of the kink is that of b = 0. On the side in front
-of it both are smooth, with b' < 0, and a design nearby has its peak at another zero of b:
+There the norm b has a kink, and with it the expression g; the time t of the kink is that of b = 0. Just before
+it both are smooth, with b' < 0, and a design nearby has its peak at another zero of b:
 
     dG = dg + g' dt,     dt = -db / b'.
 
-At the zero itself the norm's direction is rounding, so all this is read a little in front of it.
+At the zero itself the norm's direction is rounding, so all this is read a little before it.
 """
 
 import numpy as np
@@ -18,13 +18,13 @@ from mdstopo.general.responses.general_responses import RATE_SHIFT, norms_in, sw
 from mdstopo.general.steps.step_history import EVENTS
 from mdstopo.scene.springs_model import FloatArray
 
-#: how far in front of a zero is read, as fractions of the step: the second where rates are differences (`RATE_SHIFT` to
-#: both sides), which go over the zero at the first
+#: how far before a zero values are read, as fractions of the step: the second where rates are differences (`RATE_SHIFT`
+#: to both sides), which at the first would reach beyond the zero
 READ_BEFORE_ZERO = (DISTANCES[-1], 4.0 * RATE_SHIFT)
-#: a norm may pass zero at a peak if it is less than half of what it is in front of it by this share of the step
-NEAR_ZERO = 1e-3
-#: it passes zero if what it would be there at its rate is less than this share of what it is in front of it
-PASSES = 0.3
+#: a norm may pass zero at a peak if its value there is less than half of the value by this share of the step before
+LOOK_BACK = 1e-3
+#: it passes zero if its rate, from a place before the zero on, would leave less than this share of the value there
+LEFT_AT_ZERO = 0.3
 
 
 def complete_at_zeros(driver: DriverWithRun, j: int, count: int, rows: FloatArray) -> None:
@@ -47,7 +47,7 @@ def _complete(driver: DriverWithRun, j: int, part: int, count: int, row: FloatAr
         k, c = k - 1, 1.0
     length = float(t[k + 1] - t[k])
     value = driver.evaluate_one(norm, count, np.array([k, c])).item(0)
-    before = driver.evaluate_one(norm, count, np.array([k, max(c - NEAR_ZERO, 0.0)])).item(0)
+    before = driver.evaluate_one(norm, count, np.array([k, max(c - LOOK_BACK, 0.0)])).item(0)
     if value > 0.5 * before or (c >= 1.0 - READ_BEFORE_ZERO[0] and not _may_move(driver, k)):
         return
 
@@ -65,7 +65,7 @@ def _complete(driver: DriverWithRun, j: int, part: int, count: int, row: FloatAr
         falls = driver.evaluate_one(j, count, behind, who=who).item(1)
         if (
             rate < 0.0
-            and abs(value + rate * d * length) <= PASSES * value
+            and abs(value + rate * d * length) <= LEFT_AT_ZERO * value
             and row[SIGN] * rises >= 0.0 >= row[SIGN] * falls
         ):
             row[VALUE] = driver.evaluate_one(j, count, np.array([k, c]), who=who).item(0)

@@ -231,7 +231,7 @@ def _refuse_redundant(case: Case, load_case: LoadCase, redundant: Set[str]) -> N
             mistakes.append(
                 case.marks.mistake(
                     f"{path}.response",
-                    f"joint {names[0]} has equations that follow from other joints at the start; "
+                    f"joint {names[0]} shares its load with joints that repeat each other at the start; "
                     "its forces are not determined",
                 )
             )

@@ -19,7 +19,7 @@ from mdstopo.scene.springs_model import FloatArray, IndexArray
 #: a row of which no larger share than this is independent of the others is implied by them
 INDEPENDENT = 1e-9
 #: of multipliers that hold each other in balance, of norm 1, a smaller force on a joint than this is rounding
-SHARED = 1e-7
+SHARED_FORCE = 1e-7
 #: unknowns up to which their natural order is good enough
 FEW_UNKNOWNS = 30
 
@@ -133,7 +133,7 @@ def undetermined(
     names: Sequence[str], joint: IndexArray, joint_par: FloatArray, free: IndexArray, home: FloatArray,
     bodies: Kinematics,
 ) -> tuple[str, ...]:  # fmt: skip
-    """Names of the joints whose forces are not determined, for others may take what they carry.
+    """Names of the joints whose forces are not determined, because others may take what they carry.
 
     Multipliers that hold each other in balance, without any load, may be added to those of the motion: the left null
     space of Phi_q. What they put on a joint as a force is open. In space one direction is allowed: hinges of a linkage
@@ -160,7 +160,7 @@ def undetermined(
     return tuple(
         name
         for name, force in zip(names, forces, strict=True)
-        if np.count_nonzero(np.linalg.svd(force, compute_uv=False) > SHARED) > across - 2
+        if np.count_nonzero(np.linalg.svd(force, compute_uv=False) > SHARED_FORCE) > across - 2
     )
 
 
