@@ -166,6 +166,12 @@ THOROUGH: dict[str, tuple[str, ...]] = {
         "slopes[switched",
     ),
     "general/test_expression_responses.py": ("expressions[generalized_alpha",),
+    "general/test_fewer_states.py": (
+        "worth[curves",
+        "worth[crushed legs in space",
+        "looked_at[curves",
+        "would_differ",
+    ),
     "general/test_first_step.py": ("period_of_a_swing", "no_more_than_a_step_may", "same_at_every_scale"),
     "general/test_fixed_steps.py": ("near_its_switch_and_has_none",),
     "general/test_formulas_of_time.py": ("steps_of_collocation", "in_space_a_turn", "integral[wave"),
@@ -307,7 +313,14 @@ THOROUGH: dict[str, tuple[str, ...]] = {
         "best_of_all_choices[4",
         "last_neighbours",
     ),
-    "session/test_sizes.py": ("evaluations_too[[0, 0.4", "stopped_choice", "least_size[branch", "choices[branch"),
+    "session/test_sizes.py": (
+        "evaluations_too[[0, 0.4",
+        "stopped_choice",
+        "least_size[branch",
+        "choices[branch",
+        "poor_one_goes_on_where_it_was_stopped[40",
+        "poor_one_goes_on_where_it_was_stopped[150",
+    ),
     "session/test_starts_in_quotas.py": (
         "takes_over_the_first",
         "beginning[9-1",
