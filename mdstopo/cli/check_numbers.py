@@ -1,6 +1,6 @@
 """Derived quantities that `check` shows."""
 
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,31 +13,21 @@ from mdstopo.cli.output import number
 from mdstopo.cli.values_of_motion import group_names
 from mdstopo.scene.bodies import placed
 
+if TYPE_CHECKING:
+    from mdstopo.scene.vibration_modes import Modes
+
 Floats = NDArray[np.float64]
 
 _RIGID = 1e-6  # share of the highest frequency below which a mode counts as free motion
 
 
-class Modes(Protocol):
-    """What is used of `scene.vibration_modes.Modes`, for types."""
-
-    @property
-    def squares(self) -> Floats: ...
-    @property
-    def shapes(self) -> Floats: ...
-    @property
-    def least(self) -> float: ...
-    @property
-    def frequencies(self) -> Floats: ...
-
-
 class Vibrates(Protocol):
     """What has modes of small motion about the start."""
 
-    def start_modes(self, alpha: Floats, load_case: str) -> Modes: ...
+    def start_modes(self, alpha: Floats, load_case: str) -> "Modes": ...
 
 
-def growing_rates(modes: Modes) -> Floats:
+def growing_rates(modes: "Modes") -> Floats:
     """The rates in 1/s of the modes of negative stiffness, the fastest first."""
     rates: Floats = np.sqrt(-modes.squares[modes.squares < -modes.least])
     return rates

@@ -2,14 +2,17 @@
 mirrored points in another order, steps too long."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, LoadCase
-from mdstopo.cli.check_numbers import Modes, depths, growing_rates
+from mdstopo.cli.check_numbers import depths, growing_rates
 from mdstopo.cli.output import number
+
+if TYPE_CHECKING:
+    from mdstopo.scene.vibration_modes import Modes
 
 Floats = NDArray[np.float64]
 
@@ -144,7 +147,7 @@ def unrestrained(case: Case, load_case: LoadCase) -> list[tuple[str, ...]]:
     return [tuple(names) for names in sets.values()]
 
 
-def restraint(case: Case, load_case: LoadCase, modes: Modes, bodies: tuple[str, ...]) -> dict[str, Any]:
+def restraint(case: Case, load_case: LoadCase, modes: "Modes", bodies: tuple[str, ...]) -> dict[str, Any]:
     """Bodies that move without stiffness in small motion about the start, and motions that grow.
 
     bodies: whose freedoms the modes' shapes have, in their order. `free`: sets of bodies that nothing holds, which move
@@ -203,7 +206,7 @@ def _mover(case: Case, shape: Floats, bodies: tuple[str, ...]) -> str:
     return words[int(np.argmax(energies))]
 
 
-def fastest_mover(case: Case, modes: Modes, bodies: tuple[str, ...]) -> tuple[float, str] | None:
+def fastest_mover(case: Case, modes: "Modes", bodies: tuple[str, ...]) -> tuple[float, str] | None:
     """The fastest vibration about the start, rad/s, and the body that has most of it; None where nothing vibrates."""
     fastest = float(modes.squares.max(initial=0.0))
     if fastest <= modes.least:
@@ -211,7 +214,7 @@ def fastest_mover(case: Case, modes: Modes, bodies: tuple[str, ...]) -> tuple[fl
     return float(np.sqrt(fastest)), _mover(case, modes.shapes[:, int(modes.squares.argmax())], bodies)
 
 
-def long_step(case: Case, modes: Modes, bodies: tuple[str, ...]) -> str:
+def long_step(case: Case, modes: "Modes", bodies: tuple[str, ...]) -> str:
     """Why a fixed step is too long for the fastest vibration about the start, by name; nothing where it is not."""
     step, found = case.solver.step, fastest_mover(case, modes, bodies)
     if step is None or found is None:

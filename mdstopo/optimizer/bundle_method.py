@@ -250,10 +250,9 @@ class BundleMethod:
         if not trial.solved:
             state.bundle = rows = own
             trial = self._steer(state, rows, around.flat(FLOOR * steepest), here)
-        promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty)
-        state.predicted = merit(here[0], here[1:], state.penalty) - promised
+        state.predicted = _predicted_decrease(here, trial, state.penalty)
         if state.true_steps >= TRUE_STEPS and is_next_to_nothing(state.predicted, state, self.settings.tolerance):
-            state.promised = min(state.promised, self._promise(state, rows, pairs, max(steepest, 1e-300)))
+            state.promised = min(state.promised, self._promise(state, rows, here, pairs))
         state.trial = trial.x
         state.multipliers = trial.multipliers
         enough = CARRIED * np.concatenate([[1.0], state.penalty])
@@ -291,7 +290,7 @@ class BundleMethod:
 
     # -- how
 
-    def _promise(self, state: GsaoState, rows: Bundle, pairs: SecantPairs, steepest: float) -> float:
+    def _promise(self, state: GsaoState, rows: Bundle, here: Floats, pairs: SecantPairs) -> float:
         """What the curvature that steps have shown promises, of any step within the bounds; infinite where that cannot
         be told.
 
@@ -300,15 +299,11 @@ class BundleMethod:
         that steps come from they have the curvature of the last step, and where that was a stiff one nearly nothing is
         promised along what is flat and not known.
 
-        rows: the model's; pairs, steepest: of `RowModel.around`.
+        rows: the model's; here (J + 1,): the groups' levels at the iterate; pairs: of `RowModel.around`.
         """
-        here = rows.subset(rows.own).levels(len(state.penalty) + 1)
         flattest = pairs._replace(first=self.settings.tolerance * abs(state.objective))
-        trial = self.model.around(state.alpha, (np.inf, np.inf), flattest, steepest).solve(rows, state.penalty)
-        if not trial.solved:
-            return float("inf")
-        there = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty)
-        return merit(here[0], here[1:], state.penalty) - there
+        trial = self.model.around(state.alpha, (np.inf, np.inf), flattest, 0.0).solve(rows, state.penalty)
+        return _predicted_decrease(here, trial, state.penalty) if trial.solved else float("inf")
 
     def _is_smooth(self, state: GsaoState) -> bool:
         """Whether what is lowered now has no peaks; the largest violation, which limits are restored by, may have."""
@@ -426,6 +421,13 @@ class BundleMethod:
             some = rows.distance > 0.0
             over = (rows.values() - levels[rows.group])[some] / rows.distance[some] ** 2
             np.maximum.at(state.concavity, rows.group[some], over)
+
+
+def _predicted_decrease(here: Floats, trial: Trial, penalty: Floats) -> float:
+    """By how much the model lowers the merit from the iterate, where the groups' levels are here (J + 1,), to a
+    trial."""
+    there = merit(trial.levels[0] + trial.curved, trial.levels[1:], penalty)
+    return merit(here[0], here[1:], penalty) - there
 
 
 def _carried_over(concavity: Floats, groups: int) -> Floats:

@@ -71,8 +71,8 @@ class GsaoState(State):
     stands for the objective, `far_design_tried` whether a design far from a least violation was tried, `resets` how
     often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups (`Bundle.lowered`), `stagnation`
     how many iterates the largest violation has not fallen well below `violation_mark`. Of a smooth objective:
-    `true_steps` how many accepted steps in a row have gained what the model promised, and `promised`, the decrease that
-    it promises at the iterate after such steps; infinite where that is not known.
+    `true_steps` how many steps in a row have gained what the model had predicted, and `promised`, the least decrease
+    that their curvature has predicted of any step within the bounds; infinite where that is not known.
     """
 
     optimizer: ClassVar[str] = "gsao"

@@ -221,7 +221,7 @@ def verdict(
 def _left(state: GsaoState, to_gain: float) -> str:
     """What is left to be gained, as `BundleMethod.most_to_gain` tells it, as a part of a sentence; nothing where that
     is no small share of the objective."""
-    if not to_gain <= SMALL_SHARE * abs(state.objective):
+    if not to_gain < SMALL_SHARE * abs(state.objective):
         return ""
     share = to_gain / abs(state.objective)
     return f"; the slopes here and of designs tried beside it leave at most {share:.2g} of the objective to be gained"

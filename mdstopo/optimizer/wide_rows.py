@@ -105,17 +105,17 @@ class WideModel:
         """The subproblems in a box around x; see `RowModel.around`. Curvature is never scaled down as a whole."""
         s, y = _stack(pairs.steps), _stack(pairs.changes)
         vectors = [*((row, True) for row in s.rows), *((row, False) for row in y.rows)]
+        floor = FLOOR * self._scale * steepest if pairs.first is None else pairs.first
         while vectors:
             half = len(vectors) // 2
             places = self.pool.places(vectors, self.unit)
             _, products = self._products(places)
-            sigma = known_curvature(products, half, FLOOR * self._scale * steepest)
-            sigma = sigma if pairs.first is None else pairs.first
+            sigma = known_curvature(products, half, floor) if pairs.first is None else pairs.first
             M = compact(products, half, sigma)
             if M is not None:
                 return _WideAround(self, x, reach, sigma, vectors, products, M, scaled=True)
             vectors = vectors[1:half] + vectors[half + 1 :]  # without the oldest
-        return _WideAround(self, x, reach, FLOOR * self._scale * steepest, [], NO_MATRIX, NO_MATRIX, scaled=True)
+        return _WideAround(self, x, reach, floor, [], NO_MATRIX, NO_MATRIX, scaled=True)
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
         """The projected KKT residual at x; see `RowModel.residual`."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from mdstopo.optimizer import safeguards
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.competing_rows import FeasibleSet, Trial, lower_bound, residual
 from mdstopo.optimizer.gsao import Gsao
@@ -357,3 +358,11 @@ def test_numbers_whose_squares_are_none_end_a_run_with_their_size(size: float, c
     state = ended(problem)
     assert state.status is RunStatus.FAILED
     assert f"{1.5 * size:.2g}, too large to go on with" in state.reason
+
+
+@pytest.mark.parametrize(("objective", "to_gain", "said"), [(0.0, 0.0, ""), (2.0, np.inf, ""), (-2.0, 2e-5, "1e-05")])
+def test_what_is_left_is_told_as_a_share_where_there_is_one(objective: float, to_gain: float, said: str) -> None:
+    state = Gsao(Toy(lambda x: (np.array([objective]), np.ones((1, 1))), [0.5], 0.0, 1.0), settings()).start()
+    told = safeguards._left(state, to_gain)
+    assert bool(told) == bool(said)
+    assert said in told

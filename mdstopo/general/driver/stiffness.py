@@ -42,9 +42,8 @@ def held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
     finally:
         driver.allow(MAX_STEPS)
     held, steps = int(driver.work[HELD_SHORT]), int(driver.work[ACCEPTED])
-    hopeless = (
-        code == STEP_LIMIT and steps < ENOUGH_STEPS
-    )  # held so short that the motion was given up before (`braking`)
+    # held so short that the motion was given up before (`braking`)
+    hopeless = code == STEP_LIMIT and steps < ENOUGH_STEPS
     if held < STIFF_SHARE * steps or not (hopeless or held >= MANY_STEPS):
         return ""
     return f"stability holds {held} of {steps} explicit steps short, not accuracy"

@@ -73,23 +73,19 @@ def arrange(
     if len(joint):
         jac = _slopes(joint, joint_par, home, bodies)
         kept: list[FloatArray] = []
-        for j, (_, a, b, _, rows) in enumerate(joint.tolist()):
-            coordinates = [*range(each * a, each * (a + 1)), *range(each * b, each * (b + 1))]
-            for r in range(rows):
-                dense = np.zeros(len(free))
-                np.add.at(dense, coordinates, jac[j, r])
-                dense *= np.where(free == 1, 1.0 / np.sqrt(mass), 0.0)
-                size = float(np.linalg.norm(dense))
-                for _ in range(2):  # the second time against rounding
-                    for other in kept:
-                        dense -= (other @ dense) * other
-                own = float(np.linalg.norm(dense))
-                if size == 0.0 or own <= INDEPENDENT * size:
-                    redundant.append(case.joints[j].name)
-                    continue
-                kept.append(dense / own)
-                row[j, r] = len(columns)
-                columns.append([d for d in coordinates if free[d]])
+        for j, r, coordinates, dense in _rows(joint, jac, len(free), each):
+            dense *= np.where(free == 1, 1.0 / np.sqrt(mass), 0.0)
+            size = float(np.linalg.norm(dense))
+            for _ in range(2):  # the second time against rounding
+                for other in kept:
+                    dense -= (other @ dense) * other
+            own = float(np.linalg.norm(dense))
+            if size == 0.0 or own <= INDEPENDENT * size:
+                redundant.append(case.joints[j].name)
+                continue
+            kept.append(dense / own)
+            row[j, r] = len(columns)
+            columns.append([d for d in coordinates if free[d]])
     place, half = _order(len(free), free, pair, columns, each)
     meet = _meetings(joint, free, each)
     order, envelope, entries = _order_rows(row, meet, len(columns), many=len(place) > FEW_UNKNOWNS)
@@ -143,25 +139,28 @@ def undetermined(
     """
     each, across = bodies.freedoms, bodies.freedoms - bodies.rotations
     jac = _slopes(joint, joint_par, home, bodies)
-    slopes: list[FloatArray] = []
-    owner: list[tuple[int, int]] = []
-    for j, (_, a, b, _, rows) in enumerate(joint.tolist()):
-        coordinates = [*range(each * a, each * (a + 1)), *range(each * b, each * (b + 1))]
-        for r in range(rows):
-            dense = np.zeros(len(free))
-            np.add.at(dense, coordinates, jac[j, r])
-            slopes.append(dense * free)
-            owner.append((j, r))
-    left, values, _ = np.linalg.svd(np.array(slopes))
+    rows = list(_rows(joint, jac, len(free), each))
+    left, values, _ = np.linalg.svd(np.array([dense * free for *_, dense in rows]))
     balanced = left[:, np.count_nonzero(values > INDEPENDENT * values[0]) :]
     forces = np.zeros((len(joint), across, balanced.shape[1]))
-    for (j, r), multipliers in zip(owner, balanced, strict=True):
+    for (j, r, *_), multipliers in zip(rows, balanced, strict=True):
         forces[j] += np.outer(jac[j, r, :across], multipliers)
     return tuple(
         name
         for name, force in zip(names, forces, strict=True)
         if np.count_nonzero(np.linalg.svd(force, compute_uv=False) > SHARED_FORCE) > across - 2
     )
+
+
+def _rows(joint: IndexArray, jac: FloatArray, n: int, each: int) -> Iterator[tuple[int, int, list[int], FloatArray]]:
+    """Every row of the joints: which joint and row of it, the coordinates (2 D) of its bodies, and its slopes by all
+    (n,); jac: of `_slopes`, each: freedoms of a body."""
+    for j, (_, a, b, _, rows) in enumerate(joint.tolist()):
+        coordinates = [*range(each * a, each * (a + 1)), *range(each * b, each * (b + 1))]
+        for r in range(rows):
+            dense = np.zeros(n)
+            np.add.at(dense, coordinates, jac[j, r])
+            yield j, r, coordinates, dense
 
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray, bodies: Kinematics) -> FloatArray:
