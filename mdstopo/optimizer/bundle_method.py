@@ -23,7 +23,7 @@ from mdstopo.optimizer.competing_rows import (
 from mdstopo.optimizer.gsao_state import GsaoState
 from mdstopo.optimizer.nearest_feasible import project
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
-from mdstopo.optimizer.safeguards import is_least, is_next_to_nothing, nothing_is_left, residual_unit
+from mdstopo.optimizer.safeguards import is_least, is_negligible, nothing_is_left, residual_unit
 from mdstopo.optimizer.violations import merit, plain_violation, scaled_violation
 from mdstopo.settings.optimizer_presets import Settings
 
@@ -54,9 +54,9 @@ LONG_STEP, NARROW_STEP = 0.5, 0.1
 FARTHEST, LEAST_LEFT, MOST_LEFT = 5.0, 0.1, 0.6
 #: share of the objective below which a promised decrease is none
 NO_DECREASE = 1e-13
-#: of a smooth objective: the shares of the promised decrease between which a step gains what was promised, how many
-#: such steps in a row show that the curvature is known, and how many times a promise a step gains where it is not
-PROMISE_KEPT, TRUE_STEPS, PROMISE_EXCEEDED = (0.5, 1.5), 3, 10.0
+#: of a smooth objective: the ratios of actual to predicted decrease between which a model is reliable, how many such
+#: steps in a row show that the curvature is known, and the ratio from which a prediction made before was wrong
+RELIABLE_RATIO, RELIABLE_STEPS, PREDICTION_EXCEEDED = (0.5, 1.5), 3, 10.0
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
 #: for a null step, both in shares of those levels
 DECISIVE, NOT_ABOVE = 1e-12, 1e-9
@@ -125,11 +125,11 @@ class BundleMethod:
             state.penalty = self.first_penalty(rows)
         state.concavity = _carried_over(state.concavity, len(state.penalty) + 1)
         state.stagnation, state.violation_mark = 0, float("inf")
-        state.kkt, state.true_steps = float("nan"), 0
+        state.kkt, state.reliable_steps = float("nan"), 0
 
     def _restore(self, state: GsaoState) -> None:
         """Make the largest violation the objective."""
-        state.restoring, state.resets, state.promised = True, 0, float("inf")
+        state.restoring, state.resets, state.least_predicted = True, 0, float("inf")
         state.trust = max(state.trust, RESET_TRUST)
         self._begin(state)
 
@@ -205,10 +205,11 @@ class BundleMethod:
         goes_on = smooth and ratio > settings.number("poor_ratio")
         state.small = state.small + 1 if small and not goes_on else 0
         accepted = ratio >= settings.number("accept_ratio")
-        state.true_steps = state.true_steps + 1 if smooth and PROMISE_KEPT[0] <= ratio <= PROMISE_KEPT[1] else 0
+        reliable = smooth and RELIABLE_RATIO[0] <= ratio <= RELIABLE_RATIO[1]
+        state.reliable_steps = state.reliable_steps + 1 if reliable else 0
         if accepted:
-            if actual > PROMISE_EXCEEDED * state.promised:
-                state.promised = float("inf")
+            if actual > PREDICTION_EXCEEDED * state.least_predicted:
+                state.least_predicted = float("inf")
             promised = moved.subset(state.bundle.own).levels(groups)
             self._count_stagnation(state, *(float(levels[1:].max(initial=0.0)) for levels in (here, promised, there)))
             state.bundle = moved.without_peaks_of(new).joined(new)
@@ -251,8 +252,8 @@ class BundleMethod:
             state.bundle = rows = own
             trial = self._steer(state, rows, around.flat(FLOOR * steepest), here)
         state.predicted = _predicted_decrease(here, trial, state.penalty)
-        if state.true_steps >= TRUE_STEPS and is_next_to_nothing(state.predicted, state, self.settings.tolerance):
-            state.promised = min(state.promised, self._promise(state, rows, here, pairs))
+        if state.reliable_steps >= RELIABLE_STEPS and is_negligible(state.predicted, state, self.settings.tolerance):
+            state.least_predicted = min(state.least_predicted, self._predicted_anywhere(state, rows, here, pairs))
         state.trial = trial.x
         state.multipliers = trial.multipliers
         enough = CARRIED * np.concatenate([[1.0], state.penalty])
@@ -290,14 +291,14 @@ class BundleMethod:
 
     # -- how
 
-    def _promise(self, state: GsaoState, rows: Bundle, here: Floats, pairs: SecantPairs) -> float:
-        """What the curvature that steps have shown promises, of any step within the bounds; infinite where that cannot
-        be told.
+    def _predicted_anywhere(self, state: GsaoState, rows: Bundle, here: Floats, pairs: SecantPairs) -> float:
+        """The decrease that the curvature which steps have shown predicts, of any step within the bounds; infinite
+        where that cannot be told.
 
         Directions that no step has gone along are taken to be so flat that a whole range would change the objective by
-        the tolerance: next to nothing is promised only where the gradient has next to no part along them. In the model
+        the tolerance: next to nothing is predicted only where the gradient has next to no part along them. In the model
         that steps come from they have the curvature of the last step, and where that was a stiff one nearly nothing is
-        promised along what is flat and not known.
+        predicted along what is flat and not known.
 
         rows: the model's; here (J + 1,): the groups' levels at the iterate; pairs: of `RowModel.around`.
         """

@@ -190,8 +190,8 @@ class Gsao:
             concavity=np.zeros(1),
             stagnation=0,
             violation_mark=float("inf"),
-            true_steps=0,
-            promised=float("inf"),
+            reliable_steps=0,
+            least_predicted=float("inf"),
         )
 
     def _judge(self, state: GsaoState, sample: Sample) -> bool:

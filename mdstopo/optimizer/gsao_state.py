@@ -71,8 +71,8 @@ class GsaoState(State):
     stands for the objective, `far_design_tried` whether a design far from a least violation was tried, `resets` how
     often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups (`Bundle.lowered`), `stagnation`
     how many iterates the largest violation has not fallen well below `violation_mark`. Of a smooth objective:
-    `true_steps` how many steps in a row have gained what the model had predicted, and `promised`, the least decrease
-    that their curvature has predicted of any step within the bounds; infinite where that is not known.
+    `reliable_steps` how many steps in a row have gained what the model had predicted, and `least_predicted` the least
+    decrease that a model has predicted after such steps, of any step within the bounds; infinite where none has.
     """
 
     optimizer: ClassVar[str] = "gsao"
@@ -108,8 +108,8 @@ class GsaoState(State):
     concavity: Floats
     stagnation: int
     violation_mark: float
-    true_steps: int
-    promised: float
+    reliable_steps: int
+    least_predicted: float
 
     @property
     def sample(self) -> Sample:
@@ -196,6 +196,6 @@ class GsaoState(State):
 
 
 #: values of fields that older files do not have
-_ADDED: dict[str, Any] = {"far_design_tried": False, "true_steps": 0, "promised": float("inf")}
+_ADDED: dict[str, Any] = {"far_design_tried": False, "reliable_steps": 0, "least_predicted": float("inf")}
 #: fields that are arrays by name themselves
 _PARTS: dict[str, type[Bundle] | type[RowDetails]] = {"bundle": Bundle, "row_details": RowDetails}

@@ -43,8 +43,9 @@ FRESH = 1e-5
 GRADIENT_SHARE = 1e-5
 # What a residual may be at most, in shares of the violation that it says cannot be made smaller.
 RESIDUAL_SHARE = 0.1
-# What a curvature that foretells steps truly may promise at most where a run has converged, in tolerances.
-PROMISED_SHARE = 1e-1
+# The decrease that a model which was right about the last steps predicts at most where a run has converged, in
+# tolerances.
+NEGLIGIBLE_PREDICTION = 1e-1
 # The largest share of the objective that may be left to be gained and is told of a stalled run.
 SMALL_SHARE = 1e-2
 # The largest objective, constraint or slope of a usable design: steps need squares of them.
@@ -192,10 +193,10 @@ def verdict(
             f"the objective, {state.best_objective:.2g}, cannot be below {bound:g}, and what is left is within the "
             f"tolerance {settings.tolerance:.2g} of what the first design had to lose"
         )
-    if stuck and holds and is_next_to_nothing(state.promised, state, settings.tolerance):
+    if stuck and holds and is_negligible(state.least_predicted, state, settings.tolerance):
         return RunStatus.CONVERGED, (
             f"the last steps gained what the curvature that was learnt had promised, and it promises no more than "
-            f"{state.promised / abs(state.objective):.2g} of the objective"
+            f"{state.least_predicted / abs(state.objective):.2g} of the objective"
         )
     to_gain = most_to_gain(state) if stuck and holds else inf
     if nothing_is_left(state, to_gain, settings.tolerance):
@@ -255,10 +256,10 @@ def nothing_is_left(state: GsaoState, to_gain: float, tolerance: float) -> bool:
     return to_gain < tolerance * abs(state.objective)
 
 
-def is_next_to_nothing(promise: float, state: GsaoState, tolerance: float) -> bool:
-    """Whether a decrease that a curvature promises, which foretold the last steps truly, is next to nothing: what is
-    left to be gained is then a small multiple of it, far below the tolerance."""
-    return promise < PROMISED_SHARE * tolerance * abs(state.objective)
+def is_negligible(predicted: float, state: GsaoState, tolerance: float) -> bool:
+    """Whether a decrease that a model predicts, which was right about the last steps, is next to nothing: what is left
+    to be gained is then a small multiple of it, below the tolerance."""
+    return predicted < NEGLIGIBLE_PREDICTION * tolerance * abs(state.objective)
 
 
 def is_least(state: GsaoState, tolerance: float) -> bool:

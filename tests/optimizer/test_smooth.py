@@ -9,7 +9,7 @@ from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
 from mdstopo.optimizer import competing_rows
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.bundle_method import FARTHEST, LEAST_LEFT, MOST_LEFT, TRUE_STEPS, _share_to_least
+from mdstopo.optimizer.bundle_method import FARTHEST, LEAST_LEFT, MOST_LEFT, RELIABLE_STEPS, _share_to_least
 from mdstopo.optimizer.curvature import learnt
 from mdstopo.optimizer.gsao import HAND_OVER, Gsao
 from mdstopo.optimizer.interface import run
@@ -248,7 +248,7 @@ def test_a_flat_optimum_converges_by_the_curvature_that_foretold_the_last_steps(
     assert state.status is RunStatus.CONVERGED
     assert "the curvature that was learnt had promised" in state.reason
     assert state.kkt > 1e-6
-    assert state.promised <= 1e-7 * state.objective
+    assert state.least_predicted <= 1e-7 * state.objective
 
 
 def test_a_long_valley_of_many_variables_is_not_crept_along() -> None:
@@ -265,9 +265,9 @@ def test_a_promise_that_a_step_exceeds_tenfold_counts_no_more() -> None:
     problem.competes, problem.smooth = True, True
     optimizer = Gsao(problem, settings(max_iterations=400))
     state = optimizer.start()
-    while state.true_steps < TRUE_STEPS:
+    while state.reliable_steps < RELIABLE_STEPS:
         state = optimizer.step(state)
-    state.promised = 1e-2 * state.predicted
+    state.least_predicted = 1e-2 * state.predicted
     after = optimizer.step(state)
     assert after.history.accepted[-1]
-    assert after.promised > state.promised
+    assert after.least_predicted > state.least_predicted
